@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "common/base/log.h"
+#include "common/math/instruction_set.h"
 #include "worker/run/crash_handler.h"
 #include "worker/run/replay.h"
 #include "worker/run/worker.h"
@@ -113,6 +114,14 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(0, 1000000));
 
+  std::string isa = "auto";
+  app.add_option(
+         "--isa", isa,
+         "instruction set: auto, sse4, avx2 or avx512; one that all machines of a farm have "
+         "makes their bytes alike")
+      ->envname("BATON_ISA")
+      ->capture_default_str();
+
   std::string key_file;
   bool insecure = false;
   app.add_option("--key", key_file, "worker.key of `baton key create`")->envname("BATON_KEY");
@@ -148,6 +157,10 @@ int main(int argc, char** argv) {
 
   baton::init_logging("baton-worker");
   baton::install_crash_handler();
+  if (const baton::Status limited = baton::limit_instruction_set(isa); !limited) {
+    spdlog::error("{}", limited.error().message);
+    return static_cast<int>(baton::exit_code_of(limited.error().kind));
+  }
   if (replay_command->parsed()) {
     if (pixel.size() == 2) replay_options.pixel = baton::PixelPosition{pixel[0], pixel[1]};
     return replay(replay_options);

@@ -12,6 +12,8 @@ Result<std::optional<FileStamp>> stamp_of(const std::filesystem::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
     if (errno == ENOENT || errno == ENOTDIR) return std::optional<FileStamp>();
+    if (errno == ELOOP)
+      return Error{ErrorKind::bad_input, path.string() + ": is a loop of links, expected a file"};
     return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), std::strerror(errno))};
   }
   if (!S_ISREG(status.st_mode)) {

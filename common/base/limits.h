@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 
@@ -37,6 +38,10 @@ inline constexpr std::uint64_t kMaxTextureBytes = 4ull << 30;  ///< textures of 
 inline constexpr int kMaxMetadata = 256;
 inline constexpr int kMaxNameLength = 100;
 inline constexpr int kMaxTextLength = 4096;
+/// Of a coordinator's history.
+inline constexpr std::int64_t kMaxEvents = 500000;
+inline constexpr std::chrono::hours kMaxEventAge{24 * 90};
+inline constexpr std::int32_t kMaxEventsTold = 10000;  ///< in one answer
 /// Length of a frame's file name: file systems take 255, a temporary name has some more.
 inline constexpr std::size_t kMaxFileNameLength = 200;
 inline constexpr int kMaxJsonDepth = 32;

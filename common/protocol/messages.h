@@ -8,6 +8,8 @@
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
 #include "common/base/result.h"
+#include "common/job/farm_event.h"
+#include "common/job/job_id.h"
 #include "common/job/task.h"
 
 namespace baton {
@@ -17,7 +19,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 11;
+inline constexpr std::uint16_t kProtocolVersion = 12;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.
@@ -118,7 +120,7 @@ struct SubmitJob {
 struct ListJobs {
   bool all = false;  ///< also jobs that have ended, the newest
 };
-/// Names a job by its name, digest, or the unique beginning of one.
+/// Names a job by its name, its ID, the digest of a version, or the unique beginning of one.
 struct ShowJob {
   std::string job;
 };
@@ -138,10 +140,16 @@ struct DeleteJob {
   std::string job;
 };
 struct StopCoordinator {};
+/// What has happened. job: as of ShowJob; empty: of all.
+struct ListEvents {
+  std::string job;
+  EventQuery query = {};
+};
 
 // ---- coordinator to client ----------------------------------------------------------------------
+/// What a version of a job has done.
 struct JobSummary {
-  Digest job;
+  Digest version;
   /// owner: who submitted it; empty: without a key.
   std::string name, owner, output_directory;
   JobStatus status = JobStatus::running;
@@ -154,19 +162,33 @@ struct JobSummary {
   std::int32_t checkpoint_every = 0;                ///< frames
   RenderStats stats;
 };
+struct ListedJob {
+  JobIdentity identity;
+  JobSummary summary;
+};
+/// A task that a worker has.
+struct TaskInHand {
+  JobId job;
+  TaskPlace task;
+  double seconds = 0;  ///< since it was granted
+};
 struct WorkerSummary {
   std::string worker_id, host;
-  std::int32_t pid = 0, num_threads = 0, leases = 0;
+  std::int32_t pid = 0, num_threads = 0;
+  std::vector<TaskInHand> tasks = {};  ///< those that it has had for longest first
+  /// It was told to finish and to take nothing new.
+  bool is_draining = false;
 };
 struct JobAccepted {
-  Digest job;
-  /// Equal digest: the same job goes on (a success).
+  JobIdentity identity;
+  Digest version;
+  /// An equal document: the same version goes on (a success).
   bool already_there = false;
   /// What is kept and what is done again, lines; empty: all is new.
   std::string plan = {};
 };
 struct JobList {
-  std::vector<JobSummary> jobs;
+  std::vector<ListedJob> jobs;
   std::vector<WorkerSummary> workers;
   std::uint64_t num_ended = 0;  ///< jobs that have ended, listed or not
   /// Tasks of running jobs that workers may have at once.
@@ -186,6 +208,15 @@ struct JobDetail {
   bool lacks_room = false;
   std::vector<std::string> notes = {};  ///< workers' notes about the job's files
 };
+struct ShownJob {
+  JobIdentity identity;
+  JobDetail detail;
+  /// Workers are connected, and all of them render otherwise than what is done was rendered.
+  bool lacks_renderer = false;
+};
+struct EventList {
+  std::vector<FarmEvent> events;
+};
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind
   std::string message;
@@ -196,8 +227,9 @@ using Message =
     std::variant<WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed, JobDocumentRequest,
                  WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain,
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
-                 JobAccepted, JobList, JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
-                 ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates, BlobsLeft>;
+                 JobAccepted, JobList, ShownJob, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
+                 ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates, BlobsLeft,
+                 ListEvents, EventList>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

@@ -32,7 +32,7 @@ void SqlStatement::Finalize::operator()(sqlite3_stmt* statement) const {
   sqlite3_finalize(statement);
 }
 
-SqlStatement& SqlStatement::bind(std::int64_t value) {
+SqlStatement& SqlStatement::bind_integer(std::int64_t value) {
   BATON_CHECK(sqlite3_bind_int64(statement_.get(), ++num_bound_, value) == SQLITE_OK);
   return *this;
 }
@@ -46,6 +46,11 @@ SqlStatement& SqlStatement::bind(std::string_view text) {
 SqlStatement& SqlStatement::bind(ByteView blob) {
   BATON_CHECK(sqlite3_bind_blob64(statement_.get(), ++num_bound_, blob.data(), blob.size(),
                                   SQLITE_TRANSIENT) == SQLITE_OK);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind(double value) {
+  BATON_CHECK(sqlite3_bind_double(statement_.get(), ++num_bound_, value) == SQLITE_OK);
   return *this;
 }
 
@@ -70,6 +75,14 @@ void SqlStatement::reset() {
 
 std::int64_t SqlStatement::integer(int column) const {
   return sqlite3_column_int64(statement_.get(), column);
+}
+
+double SqlStatement::real(int column) const {
+  return sqlite3_column_double(statement_.get(), column);
+}
+
+bool SqlStatement::is_null(int column) const {
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
 }
 
 std::string SqlStatement::text(int column) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -21,13 +22,17 @@ namespace baton {
 class SqlStatement {
  public:
   /// Parameters are numbered from 1 in the order of the calls.
-  SqlStatement& bind(std::int64_t value);
+  template <std::integral T>
+  SqlStatement& bind(T value) {
+    return bind_integer(static_cast<std::int64_t>(value));
+  }
   SqlStatement& bind(std::string_view text);
   SqlStatement& bind(ByteView blob);
+  SqlStatement& bind(double value);
   SqlStatement& bind(const Digest& digest) { return bind(digest.hex()); }
   template <class E>
   requires std::is_enum_v<E> SqlStatement& bind(E value) {
-    return bind(static_cast<std::int64_t>(value));
+    return bind_integer(static_cast<std::int64_t>(value));
   }
 
   /// True: a row is there. False: done.
@@ -39,11 +44,14 @@ class SqlStatement {
 
   /// Columns are numbered from 0. Views are valid until the next step.
   std::int64_t integer(int column) const;
+  double real(int column) const;
+  bool is_null(int column) const;
   std::string text(int column) const;
   ByteView blob(int column) const;
 
  private:
   friend class SqlDatabase;
+  SqlStatement& bind_integer(std::int64_t value);
   struct Finalize {
     void operator()(sqlite3_stmt* statement) const;
   };

@@ -67,7 +67,7 @@ Status Journal::prepare_schema() {
                                                  database_.name(), version, kSchemaVersion)};
   }
   for (const char* const table : kCheckedTables) BATON_TRY(database_.check(table));
-  return database_.execute(kLaterTables);
+  return database_.execute(std::string(kLaterTables) + kIdentify);
 }
 
 Status Journal::count_start() {
@@ -149,6 +149,10 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   }));
 
   BATON_ASSIGN(result.failures, recent_failures(digest, -1));
+  BATON_ASSIGN(SqlStatement renderer,
+               database_.prepare("SELECT renderer FROM renderers WHERE job = ?"));
+  BATON_ASSIGN(const bool is_known, renderer.bind(digest).step());
+  if (is_known) result.renderer = renderer.text(0);
   return result;
 }
 
@@ -294,9 +298,10 @@ Status Journal::delete_job(const Digest& job) {
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM owners WHERE job = ?",
         "DELETE FROM frame_files WHERE job = ?", "DELETE FROM output_marks WHERE job = ?",
+        "DELETE FROM versions WHERE document = ?", "DELETE FROM renderers WHERE job = ?",
         "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
-  return {};
+  return change("DELETE FROM identities WHERE id NOT IN (SELECT id FROM versions)");
 }
 
 Status Journal::record_status(const Digest& job, JobStatus status) {
@@ -324,6 +329,10 @@ Status Journal::record_failure(const Failure& failure) {
       "INSERT INTO failures (job, lease, worker, message, permanent) VALUES (?, ?, ?, ?, ?)",
       failure.lease.job, to_bytes(failure.lease), failure.worker, failure.message,
       std::int64_t{failure.permanent} | std::int64_t{failure.last} << 1);
+}
+
+Status Journal::record_renderer(const Digest& job, const std::string& renderer) {
+  return change("INSERT OR REPLACE INTO renderers (job, renderer) VALUES (?, ?)", job, renderer);
 }
 
 Status Journal::record_frame_file(const Digest& job, const FrameFile& file) {

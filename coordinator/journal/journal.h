@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "common/base/file_stamp.h"
+#include "common/job/farm_event.h"
+#include "common/job/job_id.h"
 #include "coordinator/journal/database.h"
 #include "coordinator/schedule/events.h"
 
@@ -24,6 +26,7 @@ struct JournalledJob {
   JobPlan plan;
   Completions completions;  ///< in the order in which they were recorded
   std::vector<Failure> failures;
+  std::string renderer = {};  ///< of what is done of it; empty: not known
 };
 
 /// How the file of a finished frame stood when its bytes had this digest.
@@ -31,6 +34,19 @@ struct FrameFile {
   FrameIndex frame{};
   Digest digest;
   FileStamp stamp;
+};
+
+/// Which version of which job a document is.
+struct JobVersion {
+  Digest document;
+  JobId id;
+  std::int32_t number = 1;
+};
+
+/// Events of a kind that are forgotten.
+struct EventSum {
+  std::int64_t count = 0;
+  double seconds = 0;
 };
 
 /// By what a job is found.
@@ -41,9 +57,11 @@ struct JobIndex {
 
 /// One of the jobs that a text may mean.
 struct FoundJob {
-  Digest job;
+  Digest job;  ///< its newest version
   JobStatus status = JobStatus::running;
-  bool is_named = false;  ///< by the text; else its digest begins so
+  /// By the text; else its ID, or the digest of a version, begins so.
+  bool is_named = false;
+  JobId id = {};
 };
 
 /// What a coordinator must not forget: jobs, completions, failures. A job that has ended is put
@@ -99,6 +117,7 @@ class Journal {
   Status record_outputs(const Digest& job, const TaskKey& task,
                         const std::vector<BlobRef>& outputs);
   Status record_failure(const Failure& failure);
+  Status record_renderer(const Digest& job, const std::string& renderer);
   Status record_frame_file(const Digest& job, const FrameFile& file);
   Status record_output_mark(const Digest& job, bool is_marked);
   /// Forgets that these tasks were done.
@@ -119,7 +138,9 @@ class Journal {
   Result<std::uint64_t> num_archived();
   /// The jobs, in the archive or not, that write to a folder, in the order of submission.
   Result<std::vector<Digest>> jobs_in(const std::string& folder);
-  /// The jobs of this digest or name, or whose digest begins so; a few of them.
+  /// Those of this name, oldest first.
+  Result<std::vector<Digest>> jobs_in(const std::string& folder, const std::string& name);
+  /// The jobs of this name, or whose ID begins so, or the digest of a version; a few of them.
   Result<std::vector<FoundJob>> find_jobs(const std::string& text);
   /// Whether a job of the archive keeps the blob.
   Result<bool> is_kept(const Digest& blob);
@@ -128,6 +149,24 @@ class Journal {
   Result<std::uint64_t> kept_bytes();
   /// The job keeps the blob no more.
   Status let_go(const Digest& job, const Digest& blob);
+
+  // ---- who jobs are, and what happened (journal_events.cpp)
+  /// The versions of all jobs, those of each in their order.
+  Result<std::vector<JobVersion>> versions();
+  Result<std::map<JobId, JobTimes>> times();
+  /// The document is a job's newest version from now on, whatever it was before. Returns its
+  /// number.
+  Result<std::int32_t> record_version(const Digest& document, const JobId& id);
+  Status record_times(const JobId& id, const JobTimes& times);
+  /// Appends an event; its sequence number is given here.
+  Status record_event(const FarmEvent& event);
+  /// In the order of time.
+  Result<std::vector<FarmEvent>> events(const EventQuery& query);
+  /// What forgotten events of a job counted, by kind.
+  Result<std::map<FarmEventKind, EventSum>> event_sums(const JobId& job);
+  /// Forgets events but the newest `most` and those before `until_ms`; what they counted is kept as
+  /// sums for each job.
+  Status forget_events(std::int64_t most, std::int64_t until_ms);
 
   /// Makes durable what was recorded since the last commit; nothing to do is a success.
   Status commit();

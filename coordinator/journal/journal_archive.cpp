@@ -55,7 +55,7 @@ Status Journal::restart_job(const Digest& job) {
        {"DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM failures WHERE job = ?",
         "DELETE FROM completions WHERE job = ?", "DELETE FROM frame_files WHERE job = ?",
-        "UPDATE jobs SET archived = 0 WHERE digest = ?"})
+        "DELETE FROM renderers WHERE job = ?", "UPDATE jobs SET archived = 0 WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   return record_status(job, JobStatus::running);
 }
@@ -130,12 +130,23 @@ Result<std::vector<Digest>> Journal::jobs_in(const std::string& folder) {
   return read_digests(query);
 }
 
+Result<std::vector<Digest>> Journal::jobs_in(const std::string& folder, const std::string& name) {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT digest FROM jobs WHERE folder = ? AND "
+                                                     "name = ? ORDER BY position"));
+  query.bind(folder).bind(name);
+  return read_digests(query);
+}
+
 Result<std::vector<FoundJob>> Journal::find_jobs(const std::string& text) {
-  // A digest is its own beginning; of hexadecimal digits 'g' is past the last.
-  BATON_ASSIGN(
-      SqlStatement query,
-      database_.prepare("SELECT digest, status, name = ?1 FROM jobs WHERE name = ?1 OR "
-                        "(digest >= ?1 AND digest < ?1 || 'g') ORDER BY position LIMIT ?"));
+  // An ID or a digest is its own beginning; of hexadecimal digits 'g' is past the last.
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare(
+                   "SELECT digest, status, name = ?1, mine.id FROM jobs JOIN versions AS mine "
+                   "ON mine.document = digest WHERE NOT EXISTS (SELECT 1 FROM versions AS later "
+                   "WHERE later.id = mine.id AND later.number > mine.number) AND "
+                   "(name = ?1 OR mine.id IN (SELECT id FROM versions WHERE "
+                   "(id >= ?1 AND id < ?1 || 'g') OR (document >= ?1 AND document < ?1 || "
+                   "'g'))) ORDER BY position LIMIT ?"));
   query.bind(text).bind(kMaxFound);
   std::vector<FoundJob> found;
   while (true) {
@@ -143,9 +154,10 @@ Result<std::vector<FoundJob>> Journal::find_jobs(const std::string& text) {
     if (!row) return found;
     const std::optional<Digest> digest = Digest::from_hex(query.text(0));
     if (!digest) continue;
-    FoundJob job{*digest, JobStatus::running, query.integer(2) != 0};
-    job.status = static_cast<JobStatus>(query.integer(1));
-    found.push_back(job);
+    found.push_back({.job = *digest,
+                     .status = static_cast<JobStatus>(query.integer(1)),
+                     .is_named = query.integer(2) != 0,
+                     .id = JobId::from_hex(query.text(3)).value_or(JobId())});
   }
 }
 

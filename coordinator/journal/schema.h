@@ -72,6 +72,10 @@ inline constexpr const char* kSchema = R"sql(
 /// Tables that a journal of this version may lack: it gets them when it is opened, and an earlier
 /// program leaves them alone. `frame_files` says how a frame's file stood when it had this digest,
 /// `output_marks` of which open jobs the output folder is marked; store_token has one row, or none.
+/// `renderers`: by what the tasks of a job were done that are done.
+/// Where other tables say `job`, they mean the digest of a document: a version. `versions` says of
+/// which job (JobId) it is the n-th, `identities` when what happened to that job. `events` is
+/// appended to alone (FarmEvent); of those that are old, `event_sums` keeps count and seconds.
 inline constexpr const char* kLaterTables = R"sql(
   CREATE TABLE IF NOT EXISTS frame_files (
     job TEXT NOT NULL, frame INTEGER NOT NULL, digest TEXT NOT NULL,
@@ -79,6 +83,30 @@ inline constexpr const char* kLaterTables = R"sql(
     PRIMARY KEY (job, frame)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS output_marks (job TEXT PRIMARY KEY) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS store_token (token TEXT NOT NULL);
+  CREATE TABLE IF NOT EXISTS renderers (job TEXT PRIMARY KEY, renderer TEXT NOT NULL) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS versions (
+    document TEXT PRIMARY KEY, id TEXT NOT NULL, number INTEGER NOT NULL,
+    UNIQUE (id, number)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS identities (
+    id TEXT PRIMARY KEY, submitted_ms INTEGER NOT NULL DEFAULT 0,
+    started_ms INTEGER NOT NULL DEFAULT 0, ended_ms INTEGER NOT NULL DEFAULT 0) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS events (
+    sequence INTEGER PRIMARY KEY AUTOINCREMENT, time_ms INTEGER NOT NULL, kind INTEGER NOT NULL,
+    actor TEXT NOT NULL, job TEXT NOT NULL,
+    task INTEGER, first_frame INTEGER, last_frame INTEGER, tile INTEGER, attempt INTEGER,
+    worker TEXT NOT NULL, reason TEXT NOT NULL, seconds REAL NOT NULL);
+  CREATE INDEX IF NOT EXISTS events_by_job ON events (job);
+  CREATE TABLE IF NOT EXISTS event_sums (
+    job TEXT NOT NULL, kind INTEGER NOT NULL, count INTEGER NOT NULL, seconds REAL NOT NULL,
+    PRIMARY KEY (job, kind)) WITHOUT ROWID;
+)sql";
+
+/// Jobs of a journal that knew no identities go by the beginning of their digest.
+inline constexpr const char* kIdentify = R"sql(
+  INSERT OR IGNORE INTO versions (document, id, number)
+    SELECT digest, substr(digest, 1, 16), 1 FROM jobs
+    WHERE digest NOT IN (SELECT document FROM versions);
+  INSERT OR IGNORE INTO identities (id) SELECT id FROM versions;
 )sql";
 
 }  // namespace baton

@@ -88,8 +88,9 @@ struct JobAdded {
   std::vector<TaskKey> lost = {};
   /// Blobs that are gone and that nobody needs now (BlobLedger::spare_blobs).
   std::vector<BlobRef> lost_spares = {};
-  JobPlan plan = {};       ///< its leading runs stand in `spec`, too
-  std::string waits = {};  ///< for what, where it is paused
+  JobPlan plan = {};          ///< its leading runs stand in `spec`, too
+  std::string renderer = {};  ///< of what is done of it; empty: not known
+  std::string waits = {};     ///< for what, where it is paused
 };
 struct JobCancelled {
   Digest job;
@@ -125,9 +126,11 @@ struct JobForgotten {
   Digest job;
 };
 /// `running`: the leases that the worker has in hand, of this coordinator or an earlier one.
+/// renderer: what decides the bytes that it makes; empty: it does not matter.
 struct WorkerJoined {
   std::string worker;
   std::vector<LeaseId> running;
+  std::string renderer = {};
 };
 struct WorkerAlive {
   std::string worker;
@@ -228,6 +231,11 @@ struct RecordJobStatus {
   std::string reason;
 };
 
+/// What is done of the job is by this renderer; others get none of its tasks.
+struct RecordRenderer {
+  Digest job;
+  std::string renderer;
+};
 /// All tasks of the job are done: FramesInspected, which should follow, says whether their files
 /// are still there.
 struct InspectFrames {
@@ -235,6 +243,22 @@ struct InspectFrames {
 };
 struct GrantLease : Grant {
   std::string worker;
+};
+/// How an attempt at a task ended. Every grant has one end.
+enum class LeaseEnd : std::uint8_t {
+  done,
+  failed,
+  returned,  ///< not done, and nobody's failure
+  lost,      ///< its worker or its result is gone
+  revoked,   ///< nobody needs it any more
+};
+/// For the history; the scheduler's own books are up to date.
+struct TellLeaseEnd {
+  LeaseId lease;
+  std::string worker;
+  LeaseEnd end = LeaseEnd::done;
+  TimePoint granted_at;
+  std::string reason;  ///< for people; may be empty
 };
 /// Somebody waits for states that the worker holds: it should put them into the store.
 struct AskForStates {
@@ -266,8 +290,9 @@ struct RemoveBlobs {
   std::vector<Digest> blobs;
 };
 
-using Action = std::variant<RecordCompletion, RecordOutputs, RecordFailure, RecordReopened,
-                            RecordJobStatus, InspectFrames, GrantLease, AskForStates, RevokeLease,
-                            ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
+using Action =
+    std::variant<RecordCompletion, RecordOutputs, RecordFailure, RecordReopened, RecordJobStatus,
+                 RecordRenderer, InspectFrames, GrantLease, TellLeaseEnd, AskForStates, RevokeLease,
+                 ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
 
 }  // namespace baton

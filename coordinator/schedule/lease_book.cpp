@@ -7,12 +7,29 @@
 
 namespace baton {
 
-bool LeaseBook::join(const std::string& worker, TimePoint now) {
+bool LeaseBook::join(const std::string& worker, TimePoint now, const std::string& renderer) {
   const auto [place, is_new] = workers_.try_emplace(worker);
   place->second.last_sign = now;
+  place->second.renderer = renderer;
   want(worker, 0);
   if (is_new) connected_.insert(std::ranges::upper_bound(connected_, worker), worker);
   return is_new;
+}
+
+bool LeaseBook::renders_as(const std::string& worker, const std::string& renderer) const {
+  const auto found = workers_.find(worker);
+  return renderer.empty() || found == workers_.end() || found->second.renderer.empty() ||
+         found->second.renderer == renderer;
+}
+
+const std::string& LeaseBook::renderer_of(const std::string& worker) const {
+  return workers_.at(worker).renderer;
+}
+
+bool LeaseBook::nobody_renders_as(const std::string& renderer) const {
+  return !connected_.empty() && std::ranges::none_of(connected_, [&](const std::string& worker) {
+    return renders_as(worker, renderer);
+  });
 }
 
 bool LeaseBook::touch(const std::string& worker, TimePoint now) {

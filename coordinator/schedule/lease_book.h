@@ -32,8 +32,15 @@ class LeaseBook {
   /// A task of a job.
   using Place = std::pair<Digest, TaskIndex>;
 
-  /// The worker is there and wants nothing. True: it was not there before.
-  bool join(const std::string& worker, TimePoint now);
+  /// The worker is there and wants nothing. True: it was not there before. renderer: see
+  /// WorkerJoined.
+  bool join(const std::string& worker, TimePoint now, const std::string& renderer = {});
+  /// Whether what the worker makes goes with what `renderer` made; so does what nobody knows.
+  bool renders_as(const std::string& worker, const std::string& renderer) const;
+  /// The renderer of a worker, which is known.
+  const std::string& renderer_of(const std::string& worker) const;
+  /// Whether somebody is connected, and nobody renders as `renderer`.
+  bool nobody_renders_as(const std::string& renderer) const;
   /// Notes a sign of life. False: the worker is not known.
   bool touch(const std::string& worker, TimePoint now);
   /// Forgets a worker, which has no leases.
@@ -69,6 +76,7 @@ class LeaseBook {
  private:
   struct Worker {
     TimePoint last_sign;
+    std::string renderer;
     std::int32_t wanted = 0;
     std::set<Place> leases;
   };

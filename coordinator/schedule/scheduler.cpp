@@ -71,6 +71,7 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
                                          BlobSizes(event.spec)})
                  .first->second;
   job.waits = event.waits;
+  job.renderer = event.renderer;
   job.homes.share_out(leases_.connected());
   replay(job, event, actions);
   if (!is_open(event.status)) {
@@ -193,7 +194,12 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   follow_longest(claim.job->longest_seconds.at(static_cast<std::size_t>(event.lease.task.kind)),
                  event.made.stats.cpu_seconds);
   if (claim.job->status == JobStatus::running) claim.job->waits.clear();
-  drop_lease(event.lease.job, claim.task);
+  if (claim.job->renderer.empty()) {
+    claim.job->renderer = leases_.renderer_of(event.worker);
+    if (!claim.job->renderer.empty())
+      actions.push_back(RecordRenderer{event.lease.job, claim.job->renderer});
+  }
+  end_lease(event.lease.job, claim.task, LeaseEnd::done, {}, actions);
   actions.push_back(RecordCompletion{event.lease.job, std::move(completion)});
   if (is_equal) end_if_finished(event.lease.job, *claim.job, actions);
 }
@@ -229,16 +235,16 @@ void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) 
   if (!leases_.touch(event.worker, now)) return;
   if (const Claim claim = find_claim(event.worker, event.lease, now); claim.job) {
     claim.job->tasks.attempts().add_returned(claim.task, event.lease, event.worker);
-    lose_lease(event.lease.job, claim.task, actions);
+    lose_lease(event.lease.job, claim.task, "what it made is gone", actions);
   }
   on(AttemptLeft{event.lease, stored_blobs(event.outputs)}, now, actions);
 }
 
-void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
+void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
   const Claim claim = find_claim(event.worker, event.lease, now);
   if (!claim.job) return;
-  return_lease(claim, event.lease, event.worker);
+  return_lease(claim, event.lease, event.message, actions);
   claim.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = now + kRest;
   for (auto& [digest, job] : jobs_) {
     if (is_open(job.status)) job.tasks.let_between_go(blobs_);
@@ -246,12 +252,14 @@ void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
   claim.job->waits = event.message;
 }
 
-void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions&) {
+void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
   if (Job* job = find(event.lease.job); job != nullptr && !event.unseen.empty())
     job->standings.add_blind(event.worker, event.unseen, now);
   const Claim claim = find_claim(event.worker, event.lease, now);
-  if (claim.job) return_lease(claim, event.lease, event.worker);
+  if (claim.job)
+    return_lease(claim, event.lease,
+                 event.unseen.empty() ? "no time left" : "does not see " + event.unseen, actions);
 }
 
 void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
@@ -269,7 +277,7 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
     if (lost) makers.push_back(tasks.graph().key(input));
   }
   tasks.attempts().add_returned(claim.task, event.lease, event.worker);
-  lose_lease(event.lease.job, claim.task, actions);
+  lose_lease(event.lease.job, claim.task, "its inputs are gone or damaged", actions);
   if (is_open(claim.job->status)) reopen({event.lease.job, makers}, *claim.job, actions);
 }
 
@@ -338,7 +346,7 @@ void Scheduler::reopen(RecordReopened record, Job& job, Actions& actions) {
 void Scheduler::fail_attempt(const Claim& claim, Failure failure, TimePoint now, Actions& actions) {
   const Digest digest = failure.lease.job;
   Job& job = *claim.job;
-  drop_lease(digest, claim.task);
+  end_lease(digest, claim.task, LeaseEnd::failed, failure.message, actions);
   job.tasks.add_failure(claim.task, failure, blobs_);
   failure.last = is_exhausted(leases_.connected(), job.tasks.attempts().blame(claim.task),
                               job.spec.max_retries_per_task);

@@ -56,6 +56,7 @@ class Scheduler {
     Run begun_runs{0};
     std::array<TimePoint, 3> rests_until = {};  ///< tasks of each kind
     std::string waits = {};                     ///< for what, as far as an event said so
+    std::string renderer = {};                  ///< of what is done; empty: not known
     Standings standings = {};
     std::array<double, 3> longest_seconds = {};  ///< CPU time of tasks of each kind, of late
 
@@ -139,9 +140,11 @@ class Scheduler {
                  TimePoint granted_until, TimePoint now, Actions& actions);
   Lease& add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now);
   void revoke_lease(const Digest& job, TaskIndex task, Actions& actions);
-  void drop_lease(const Digest& job, TaskIndex task);
-  void return_lease(const Claim& claim, const LeaseId& lease, const std::string& worker);
-  void lose_lease(const Digest& job, TaskIndex task, Actions& actions);
+  void end_lease(const Digest& job, TaskIndex task, LeaseEnd end, const std::string& reason,
+                 Actions& actions);
+  void return_lease(const Claim& claim, const LeaseId& lease, const std::string& reason,
+                    Actions& actions);
+  void lose_lease(const Digest& job, TaskIndex task, const std::string& reason, Actions& actions);
   void remove_worker(const std::string& worker, bool lost, Actions& actions);
   void lose_held(const std::string& worker, Actions& actions);
   void serve(TimePoint now, Actions& actions);

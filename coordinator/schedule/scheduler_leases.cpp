@@ -23,7 +23,7 @@ StepSpan steps_to_render(const JobTasks& tasks, TaskIndex task) {
 // ---- events: workers ----------------------------------------------------------------------------
 
 void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
-  const bool is_new = leases_.join(event.worker, now);
+  const bool is_new = leases_.join(event.worker, now, event.renderer);
   for (auto& [digest, job] : jobs_) {
     job.standings.forget(event.worker);
     job.tasks.attempts().forgive(event.worker);
@@ -87,7 +87,8 @@ Scheduler::Claim Scheduler::find_claim(const std::string& worker, const LeaseId&
     return current.id == lease && current.worker == worker ? Claim{job, *task} : Claim{};
   }
   if (job->tasks.book().status(*task) != TaskStatus::ready ||
-      job->tasks.attempts().has_ended(*task, lease) || !can_read(job->tasks, *task, worker))
+      job->tasks.attempts().has_ended(*task, lease) || !can_read(job->tasks, *task, worker) ||
+      !leases_.renders_as(worker, job->renderer))
     return {};
   job->tasks.grant(*task);
   add_lease(worker, lease, *task, now);
@@ -102,7 +103,7 @@ void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>&
   for (const auto& [job, task] : leases_.of_worker(worker)) {
     const Lease* const lease = leases_.find({job, task});
     if (lease == nullptr || lease->granted_at > granted_until) continue;
-    if (!in_hand.contains(lease->id)) lose_lease(job, task, actions);
+    if (!in_hand.contains(lease->id)) lose_lease(job, task, "its worker does not have it", actions);
   }
 
   // What it names it keeps, if nobody else has it.
@@ -121,29 +122,34 @@ Lease& Scheduler::add_lease(const std::string& worker, const LeaseId& lease, Tas
   return leases_.add(task, {lease, worker, now, job.sizes.largest(job.tasks.graph(), lease.task)});
 }
 
-void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
+void Scheduler::end_lease(const Digest& job, TaskIndex task, LeaseEnd end,
+                          const std::string& reason, Actions& actions) {
   const Lease lease = leases_.drop({job, task});
   for (const Digest& blob : lease.left) blobs_.discard(blob);
+  actions.push_back(TellLeaseEnd{lease.id, lease.worker, end, lease.granted_at, reason});
 }
 
 void Scheduler::revoke_lease(const Digest& job, TaskIndex task, Actions& actions) {
   const Lease& lease = leases_.at({job, task});
   actions.push_back(RevokeLease{lease.worker, lease.id});
-  drop_lease(job, task);
+  end_lease(job, task, LeaseEnd::revoked, {}, actions);
 }
 
 /// A lease that ends without a result, and without anybody's failure.
-void Scheduler::return_lease(const Claim& claim, const LeaseId& lease, const std::string& worker) {
-  drop_lease(lease.job, claim.task);
+void Scheduler::return_lease(const Claim& claim, const LeaseId& lease, const std::string& reason,
+                             Actions& actions) {
+  const std::string worker = leases_.at({lease.job, claim.task}).worker;
+  end_lease(lease.job, claim.task, LeaseEnd::returned, reason, actions);
   claim.job->tasks.attempts().add_returned(claim.task, lease, worker);
   claim.job->tasks.give_back(claim.task);
 }
 
 /// The worker no longer has it, or nobody has what it made: no failure. But a task that was lost
 /// too often probably kills its workers, and people should look at it.
-void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& actions) {
+void Scheduler::lose_lease(const Digest& digest, TaskIndex task, const std::string& reason,
+                           Actions& actions) {
   Job& job = jobs_.at(digest);
-  drop_lease(digest, task);
+  end_lease(digest, task, LeaseEnd::lost, reason, actions);
   job.tasks.give_back(task);
   count_loss(digest, job, task, actions);
 }
@@ -165,9 +171,9 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
     // The end of a job may have taken the lease already.
     if (leases_.find({job, task}) == nullptr) continue;
     if (lost) {
-      lose_lease(job, task, actions);
+      lose_lease(job, task, "its worker is silent", actions);
     } else {
-      drop_lease(job, task);
+      end_lease(job, task, LeaseEnd::returned, "its worker left", actions);
       jobs_.at(job).tasks.give_back(task);
     }
   }
@@ -241,7 +247,9 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
   for (const auto& [rank, digest] : running_) {
     Job& job = jobs_.at(digest);
     const Crew crew = job.crew(leases_, now);
-    if (job.tasks.book().ready().empty() || rests(crew, worker)) continue;
+    if (job.tasks.book().ready().empty() || rests(crew, worker) ||
+        !leases_.renders_as(worker, job.renderer))
+      continue;
     const JobGraph& graph = job.tasks.graph();
     const auto task = job.homes.choose(
         graph, job.tasks.book().ready(),
@@ -280,6 +288,13 @@ bool Scheduler::Job::is_due(TaskIndex task, const std::string& worker, const Cre
 std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   const Job& job = jobs_.at(digest);
   if (!is_open(job.status) || !job.waits.empty()) return job.waits;
+  if (leases_.nobody_renders_as(job.renderer)) {
+    return fmt::format(
+        "a worker that renders as what is done was rendered, with {}: those that are connected "
+        "render with {}, and pixels may differ. --restart renders all frames again, --from-frame N "
+        "those from N on; `baton-worker --isa` makes unlike machines alike",
+        job.renderer, leases_.renderer_of(leases_.connected().front()));
+  }
   if (lacks_room(digest)) return lacking_room(job);
   const Crew crew = job.crew(leases_, now);
   if (const std::string unseen = job.standings.unseen(); !unseen.empty() && are_all_blind(crew))

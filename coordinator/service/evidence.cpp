@@ -56,14 +56,18 @@ std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const Tas
   return frame;
 }
 
-bool writes_nowhere(const FarmCore& farm, const LeaseId& lease) {
+std::optional<std::string> find_hindrance(const FarmCore& farm, const LeaseId& lease) {
   const Scheduler::Job* job = job_of_open_task(farm, lease);
-  if (job == nullptr) return false;
+  if (job == nullptr) return std::nullopt;
   const bool is_frame = lease.task.kind == TaskKind::assemble;
   fs::path folder = is_frame ? fs::path(job->spec.output.directory) : farm.store_directory;
   std::error_code error;
+  const fs::path frame = is_frame ? frame_path(job->spec, lease.task.frame()) : fs::path();
+  if (is_frame && fs::is_directory(frame, error))
+    return "a frame's place: " + frame.string() + " is a folder";
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
-  return ::access(folder.c_str(), W_OK) != 0 && errno == EROFS;
+  if (::access(folder.c_str(), W_OK) == 0 || errno != EROFS) return std::nullopt;
+  return "a folder that can be written";
 }
 
 std::optional<std::vector<BlobRef>> find_bad_inputs(const FarmCore& farm, FileTable& files,

@@ -23,8 +23,10 @@ struct ReportedFrame {
 };
 /// nullopt: no such frame is reported.
 std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const TaskDone& report);
-/// Whether the file system that a task of an open job writes to is mounted read-only.
-bool writes_nowhere(const FarmCore& farm, const LeaseId& lease);
+/// What a task of an open job lacks to write what it makes, whoever does it: "a folder that can be
+/// written", where the file system is mounted read-only, or its frame's place, where a folder
+/// stands. nullopt: nothing that can be seen from here.
+std::optional<std::string> find_hindrance(const FarmCore& farm, const LeaseId& lease);
 /// The inputs of a leased task that must be read to tell whether they are damaged.
 std::vector<FileToRead> unread_inputs(const FarmCore& farm, const FileTable& files,
                                       const LeaseId& lease);

@@ -34,7 +34,8 @@ FarmCore::FarmCore(const ServiceOptions& with, Router messages, Journal records,
       router(std::move(messages)),
       journal(std::move(records)),
       store(std::move(blobs)),
-      scheduler(journal.epoch(), kSilentHeartbeats * with.heartbeat, with.store_limit) {}
+      scheduler(journal.epoch(), kSilentHeartbeats * with.heartbeat, with.store_limit),
+      history(journal) {}
 
 Status FarmCore::let_out() {
   for (const Outgoing& outgoing : std::exchange(outbox_, {})) {
@@ -99,9 +100,10 @@ Status FarmCore::check_own(const Speaker& speaker, const Digest& job) const {
   if (speaker.name.empty() || speaker.role != Role::user) return {};
   const std::string owner = owner_of(job);
   if (owner == speaker.name) return {};
-  return Error{ErrorKind::usage,
-               fmt::format("job {} belongs to {}: user '{}' may not change it", job.short_hex(),
-                           owner.empty() ? "nobody" : fmt::format("'{}'", owner), speaker.name)};
+  return Error{
+      ErrorKind::usage,
+      fmt::format("job {} belongs to {}: user '{}' may not change it", history.name_of(job),
+                  owner.empty() ? "nobody" : fmt::format("'{}'", owner), speaker.name)};
 }
 
 Status FarmCore::count_kept() {
@@ -126,7 +128,7 @@ Result<std::optional<JobDetail>> FarmCore::archived_detail(const Digest& job) {
   reader(detail);
   if (!reader.complete())
     return Error{ErrorKind::corrupt,
-                 fmt::format("the archived job {} cannot be read", job.short_hex())};
+                 fmt::format("the archived job {} cannot be read", history.name_of(job))};
   return std::optional(std::move(detail));
 }
 
@@ -171,20 +173,22 @@ Status FarmCore::perform(const RecordOutputs& action) {
 
 Status FarmCore::perform(const RecordFailure& action) {
   const Failure& failure = action.failure;
-  spdlog::warn("job {}: attempt {} on {} failed: {}", failure.lease.job.short_hex(),
+  spdlog::warn("job {}: attempt {} on {} failed: {}", history.name_of(failure.lease.job),
                failure.lease.attempt, failure.worker, failure.message);
   return journal.record_failure(failure);
 }
 
 Status FarmCore::perform(const RecordReopened& action) {
-  spdlog::warn("job {}: {} finished tasks are done again, since {} is gone", action.job.short_hex(),
-               action.tasks.size(), action.gone);
+  spdlog::warn("job {}: {} finished tasks are done again, since {} is gone",
+               history.name_of(action.job), action.tasks.size(), action.gone);
+  BATON_TRY(history.reopened(action));
   return journal.record_reopened(action.job, action.tasks);
 }
 
 Status FarmCore::perform(const RecordJobStatus& action) {
   const auto level = action.status == JobStatus::failed ? spdlog::level::err : spdlog::level::info;
-  spdlog::log(level, "job {}: {}", action.job.short_hex(), action.reason);
+  spdlog::log(level, "job {}: {}", history.name_of(action.job), action.reason);
+  BATON_TRY(history.status_changed(action.job, action.status, action.reason));
   // Before the status is durable: whoever is killed in between ends the job, and writes, again.
   const Scheduler::Job* job = scheduler.find_job(action.job);
   if (job != nullptr && !is_open(action.status) && check_output_root(job->spec, options.roots)) {
@@ -204,6 +208,10 @@ Status FarmCore::perform(const RecordJobStatus& action) {
   return journal.record_status(action.job, action.status);
 }
 
+Status FarmCore::perform(const RecordRenderer& action) {
+  return journal.record_renderer(action.job, action.renderer);
+}
+
 Status FarmCore::perform(const InspectFrames& action) {
   to_inspect.emplace(action.job, Clock::now());
   return {};
@@ -211,7 +219,12 @@ Status FarmCore::perform(const InspectFrames& action) {
 
 Status FarmCore::perform(const GrantLease& action) {
   const Grant& grant = action;
+  BATON_TRY(history.granted(*scheduler.find_job(grant.lease.job), grant.lease, action.worker));
   return reply_to(action.worker, grant);
+}
+
+Status FarmCore::perform(const TellLeaseEnd& action) {
+  return history.lease_ended(scheduler.find_job(action.lease.job), action);
 }
 
 Status FarmCore::perform(const AskForStates& action) {
@@ -229,14 +242,14 @@ Status FarmCore::perform(const ReportNoWork& action) {
 Status FarmCore::perform(const ForgetWorker& action) {
   spdlog::warn("worker {} is silent: its leases go to others", action.worker);
   peers.remove(action.worker);
-  return {};
+  return history.happened(FarmEventKind::worker_lost, action.worker);
 }
 
 Status FarmCore::perform(const ReportConflict& action) {
   spdlog::error(
       "BUG: job {}: {}: worker {} reports {} for frame index {}, tile {}, but worker {} has "
       "reported {}",
-      action.lease.job.short_hex(), describe_task(action.lease.task), action.worker,
+      history.name_of(action.lease.job), describe_task(action.lease.task), action.worker,
       action.reported.digest.hex(), action.reported.position, action.reported.tile, action.maker,
       action.expected.digest.hex());
   return {};
@@ -251,12 +264,10 @@ Status FarmCore::perform(const RemoveBlobs& action) {
 
 void FarmCore::keep_token() const {
   const fs::path file = store_directory / "token";
-  const Result<std::optional<FileStamp>> stamp = stamp_of(file);
-  const bool is_gone = stamp && (!*stamp || (*stamp)->size_bytes < token.size());
-  if (!is_gone) return;
+  if (expect_token(file, token)) return;
   const Status written = write_token(file, token);
-  spdlog::warn(
-      "{}", written ? file.string() + ": was gone and is written again" : written.error().message);
+  spdlog::warn("{}", written ? file.string() + ": was gone or changed and is written again"
+                             : written.error().message);
 }
 
 Status FarmCore::take_up_marks() {
@@ -288,9 +299,10 @@ std::optional<std::string> FarmCore::lost_mark(const Digest& job, const JobSpec&
   const fs::path folder = spec.output.directory;
   const fs::path file = output_token_file(folder, job);
   const Result<std::optional<FileStamp>> stamp = stamp_of(file);
-  if (!stamp || *stamp) return std::nullopt;
+  const bool may_pass = !stamp && stamp.error().kind == ErrorKind::io;
+  if (may_pass || (stamp && *stamp)) return std::nullopt;
   std::error_code error;
-  if (!fs::exists(folder, error))
+  if (!fs::is_directory(folder, error))
     return fmt::format("{}: the output folder is not there", folder.string());
   return fmt::format("{}: not the output folder that the job has written to: {} is gone from it",
                      folder.string(), file.filename().string());

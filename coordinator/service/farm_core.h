@@ -14,6 +14,7 @@
 #include "coordinator/journal/journal.h"
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/service/file_reader.h"
+#include "coordinator/service/history.h"
 #include "coordinator/service/peers.h"
 
 namespace baton {
@@ -56,6 +57,7 @@ class FarmCore {
   BlobStore store;
   Scheduler scheduler;
   Peers peers;
+  History history;
   std::map<Digest, std::string> owners;  ///< who submitted which job
   /// What workers say of the files of living jobs.
   std::map<Digest, std::vector<std::string>> notes;
@@ -126,8 +128,10 @@ class FarmCore {
   Status perform(const RecordFailure& action);
   Status perform(const RecordReopened& action);
   Status perform(const RecordJobStatus& action);
+  Status perform(const RecordRenderer& action);
   Status perform(const InspectFrames& action);
   Status perform(const GrantLease& action);
+  Status perform(const TellLeaseEnd& action);
   Status perform(const AskForStates& action);
   Status perform(const RevokeLease& action);
   Status perform(const ReportNoWork& action);

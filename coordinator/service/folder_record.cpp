@@ -36,9 +36,10 @@ std::map<fs::path, std::vector<BlobRef>> FolderRecord::frames_of(const JobSpec& 
   for (std::size_t i = 0; i < job.frames.size(); ++i) {
     const fs::path path =
         frame_path(job, FrameIndex(static_cast<std::int32_t>(i))).lexically_normal();
+    std::vector<BlobRef>& recorded = frames[path];
     const auto found = images_.find(path);
     if (found == images_.end()) continue;
-    for (const Image& image : found->second) frames[path].push_back(image.image);
+    for (const Image& image : found->second) recorded.push_back(image.image);
   }
   return frames;
 }
@@ -56,10 +57,13 @@ bool FolderRecord::has_written(const fs::path& path, const FileVerdict& picture)
          std::ranges::none_of(images, [&](const Image& image) { return image.job == *writer; });
 }
 
-OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& job) {
+OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const Digest& job,
+                          const JobSpec& spec) {
   OddFrames odd;
-  for (const auto& [path, images] : record.frames_of(job)) {
-    FileVerdict verdict = files.judge(path, images.front());
+  BlobRef nothing;
+  nothing.kind = BlobKind::image;
+  for (const auto& [path, images] : record.frames_of(spec)) {
+    FileVerdict verdict = files.judge(path, images.empty() ? nothing : images.front());
     for (const BlobRef& image : images) {
       if (verdict.state != FileState::right && files.is_right(path, image))
         verdict.state = FileState::right;
@@ -70,7 +74,8 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
       odd.unread.push_back(std::move(file));
     } else if (verdict.state == FileState::unreadable) {
       odd.unreadable = verdict.fault;
-    } else if (verdict.state == FileState::strange && !record.has_written(path, verdict)) {
+    } else if (verdict.state == FileState::strange && verdict.writer != job.hex() &&
+               !record.has_written(path, verdict)) {
       odd.strange.push_back(path.string());
     }
   }
@@ -83,10 +88,9 @@ std::string strange_text(const std::vector<std::string>& strange) {
   const auto shown = std::span(strange).first(std::min(kMost, strange.size()));
   const std::size_t more = strange.size() - shown.size();
   return fmt::format(
-      "{}{} {} not what was written: {} changed or replaced, and {} kept; --restart renders {} "
-      "again",
+      "{}{} {} not what a job has written here: another picture, changed or replaced, which is "
+      "kept; --restart renders {} again",
       fmt::join(shown, ", "), more > 0 ? fmt::format(" and {} more", more) : "",
-      strange.size() == 1 ? "is" : "are", strange.size() == 1 ? "it was" : "they were",
       strange.size() == 1 ? "is" : "are", strange.size() == 1 ? "it" : "them");
 }
 

@@ -18,7 +18,8 @@ class FolderRecord {
   /// folder: folder_of() a job.
   static Result<FolderRecord> read(Journal& journal, const std::string& folder);
 
-  /// The frames of a job that are recorded, by the path of their file, each with what it may be.
+  /// The frames of a job by the path of their file, each with what it may be as far as it is
+  /// recorded.
   std::map<std::filesystem::path, std::vector<BlobRef>> frames_of(const JobSpec& job) const;
   /// Whether a picture in the place of a frame is a job's of this folder: one that is recorded, or
   /// one that was written and never reported.
@@ -33,14 +34,16 @@ class FolderRecord {
   std::vector<Digest> jobs_;
 };
 
-/// The frames of a job that are not as they were recorded.
+/// The files in the places of a job's frames that are not what its folder's jobs have recorded.
 struct OddFrames {
   std::vector<FileToRead> unread;    ///< only their bytes can tell
   std::vector<std::string> strange;  ///< files that are pictures of nobody here
   /// Why one of them cannot be read; empty: none is.
   std::string unreadable;
 };
-OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& job);
+/// job: the digest of the document of `spec`; what its header names may be written again.
+OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const Digest& job,
+                          const JobSpec& spec);
 /// For people: that these are others' frames now; empty: there are none.
 std::string strange_text(const std::vector<std::string>& strange);
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "coordinator/schedule/held_states.h"
+#include "coordinator/service/history.h"
 
 namespace baton {
 namespace {
@@ -22,28 +23,11 @@ std::vector<FrameNumber> finished_frames(const Scheduler::Job& job) {
   return frames;
 }
 
-/// Where a task of the job stands, for people: "frames 9-12, tile 3".
-std::string place_text(const Scheduler::Job& job, const TaskKey& task) {
-  const Timeline& timeline = job.tasks.graph().timeline();
-  const auto number = [&](FrameIndex frame) { return job.spec.frames[frame.index()]; };
-  switch (task.kind) {
-    case TaskKind::assemble:
-      return fmt::format("frame {}", number(task.frame()));
-    case TaskKind::second_pass:
-      return fmt::format("frame {}, tile {}, second pass", number(timeline.frame_of(task.step())),
-                         task.tile);
-    case TaskKind::render:
-      const StepSpan steps = timeline.steps_of(task.run());
-      return fmt::format("frames {}-{}, tile {}", number(timeline.frame_of(steps.first)),
-                         number(timeline.frame_of(steps.last)), task.tile);
-  }
-  return {};
-}
-
 std::string describe(const Scheduler::Job& job, const Failure& failure) {
   const TaskKey& task = failure.lease.task;
   if (!job.tasks.graph().find(task)) return failure.message;
-  return fmt::format("{} on {}: {}", place_text(job, task), failure.worker, failure.message);
+  return fmt::format("{} on {}: {}", place_text(place_of(job, task)), failure.worker,
+                     failure.message);
 }
 
 }  // namespace
@@ -55,7 +39,7 @@ std::string folder_of(const JobSpec& job) {
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
   const JobProgress progress = job.tasks.progress();
   JobSummary summary;
-  summary.job = digest;
+  summary.version = digest;
   summary.name = job.spec.name;
   summary.output_directory = job.spec.output.directory;
   summary.status = job.status;
@@ -95,7 +79,7 @@ Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string&
   const bool any_named =
       std::any_of(found.begin(), found.end(), [](const FoundJob& job) { return job.is_named; });
   for (const FoundJob& job : found) {
-    if (job.job.hex() == text) return job.job;
+    if (job.id.hex() == text || job.job.hex() == text) return job.job;
     if (job.is_named == any_named) matches.push_back(job);
   }
   std::vector<FoundJob> open = matches;
@@ -107,7 +91,7 @@ Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string&
 
   std::string list;
   for (const FoundJob& job : matches)
-    list += fmt::format("\n  {}  {}", job.job.hex(), job_status_name(job.status));
+    list += fmt::format("\n  {}  {}", job.id.hex(), job_status_name(job.status));
   return Error{ErrorKind::bad_input,
                fmt::format("job '{}': {} jobs {}:{}", text, matches.size(),
                            any_named ? "have this name" : "have IDs that begin so", list)};

@@ -20,9 +20,9 @@ JobSummary summarize(const Digest& digest, const Scheduler::Job& job);
 JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
                        const std::vector<Failure>& failures);
 
-/// Which of the jobs that were found for a text is meant: the one of this digest, or of this name,
-/// or whose digest begins so; where several are, the only one that has not ended. Errors: none, or
-/// several, whose digests it lists.
+/// Which of the jobs that were found for a text is meant: the one of this ID, or of this name, or
+/// whose ID begins so; where several are, the only one that has not ended. Returns its newest
+/// version. Errors: none, or several, whose IDs it lists.
 Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string& text);
 
 /// What is not there of the files that a job's recorded completions promise: blobs that are still

@@ -40,14 +40,14 @@ std::string differing_text(const std::vector<std::string>& differing) {
   return fmt::format("{}{}", fmt::join(shown, ", "), differing.size() > kMost ? ", ..." : "");
 }
 
-Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job) {
+Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job,
+                      const std::string& other_name) {
   std::string text = fmt::format(
       "job '{}': its frames would replace those of job {} ('{}', {}, {} of {} frames) in {}, which "
       "is another picture; what differs: {}\n"
       "--restart replaces them, another output.directory keeps them",
-      job.name, other.job.short_hex(), other_job.name, job_status_name(other.status),
-      other.num_there, other_job.frames.size(), job.output.directory,
-      differing_text(other.differing));
+      job.name, other_name, other_job.name, job_status_name(other.status), other.num_there,
+      other_job.frames.size(), job.output.directory, differing_text(other.differing));
   text += "; --from-frame N keeps those before frame N and renders from there on afresh";
   if (other.first_differing && *other.first_differing != other.written.front())
     text +=
@@ -92,6 +92,11 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
   }
   other.differing.assign(differing.begin(), differing.end());
   other.busy = is_open(status) && shared.empty();
+  const std::map<FrameIndex, FrameIndex> in_both(shared.begin(), shared.end());
+  for (FrameIndex frame; frame.index() < theirs.frames.size(); ++frame) {
+    if (!in_both.contains(frame) && !images.contains(frame))
+      other.left_out.push_back(theirs.frames[frame.index()]);
+  }
   return other;
 }
 

@@ -20,6 +20,8 @@ struct Neighbour {
   std::optional<FrameNumber> first_differing;
   bool busy = false;          ///< it is open and shares no frame
   std::size_t num_there = 0;  ///< frames in common that it has written
+  /// Frames that it has not written and the new one does not have.
+  std::vector<FrameNumber> left_out = {};
 };
 
 /// What a journalled job has written, beside a new one. owned: its frames by number, without those
@@ -29,7 +31,9 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
 
 /// Some of what differs, for people.
 std::string differing_text(const std::vector<std::string>& differing);
-/// Why a job is refused whose frames would replace those of another picture.
-Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job);
+/// Why a job is refused whose frames would replace those of another picture. other_name: short, of
+/// that job.
+Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job,
+                      const std::string& other_name);
 
 }  // namespace baton

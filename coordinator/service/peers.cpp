@@ -9,9 +9,12 @@
 namespace baton {
 
 void Peers::add(const PeerId& peer, const WorkerHello& hello) {
+  const auto before = workers_.find(hello.worker_id);
+  const bool drains = before != workers_.end() && before->second.is_draining &&
+                      before->second.hello.instance == hello.instance;
   remove(worker_of(peer));
   remove(hello.worker_id);
-  workers_[hello.worker_id] = {peer, hello};
+  workers_[hello.worker_id] = {peer, hello, drains};
   names_[peer] = hello.worker_id;
 }
 
@@ -48,7 +51,11 @@ const WorkerHello* Peers::hello_of(const std::string& worker) const {
 std::vector<WorkerSummary> Peers::summaries() const {
   std::vector<WorkerSummary> result;
   for (const auto& [name, entry] : workers_) {
-    result.push_back({name, entry.hello.host, entry.hello.pid, entry.hello.num_threads, 0});
+    result.push_back({.worker_id = name,
+                      .host = entry.hello.host,
+                      .pid = entry.hello.pid,
+                      .num_threads = entry.hello.num_threads,
+                      .is_draining = entry.is_draining});
   }
   return result;
 }

@@ -16,6 +16,8 @@ class Peers {
   /// Introduces or replaces a worker.
   void add(const PeerId& peer, const WorkerHello& hello);
   void remove(const std::string& worker);
+  /// It was told to finish; that stays so when it connects again.
+  void drain(const std::string& worker) { workers_.at(worker).is_draining = true; }
   /// The ID by which a worker goes here: its name, or where another process has that, the name and
   /// some digits of its instance.
   std::string id_for(const WorkerHello& hello) const;
@@ -27,7 +29,7 @@ class Peers {
   /// What it said of itself; null: no such worker.
   const WorkerHello* hello_of(const std::string& worker) const;
   std::size_t num_workers() const { return workers_.size(); }
-  /// By name, without their leases.
+  /// By name, without their tasks.
   std::vector<WorkerSummary> summaries() const;
   std::vector<PeerId> connections() const;
   /// A connected worker that renders with something else; null: there is none.
@@ -37,6 +39,7 @@ class Peers {
   struct Entry {
     PeerId peer;
     WorkerHello hello;
+    bool is_draining = false;
   };
   std::map<std::string, Entry> workers_;
   std::map<PeerId, std::string> names_;

@@ -34,6 +34,7 @@ template <> inline constexpr Rights kRights<JobDocumentRequest> {"read jobs",   
 template <> inline constexpr Rights kRights<SubmitJob>          {"submit jobs",   May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<ListJobs>           {"list jobs",     May::no,  May::yes, May::yes};
 template <> inline constexpr Rights kRights<ShowJob>            {"look at jobs",  May::no,  May::yes, May::yes};
+template <> inline constexpr Rights kRights<ListEvents>         {"list events",   May::no,  May::yes, May::yes};
 template <> inline constexpr Rights kRights<PauseJob>           {"pause jobs",    May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<ResumeJob>          {"resume jobs",   May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<CancelJob>          {"cancel jobs",   May::no,  May::own, May::yes};

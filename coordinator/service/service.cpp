@@ -54,6 +54,7 @@ Result<Service> Service::open(const ServiceOptions& options) {
   Service service(std::make_unique<FarmCore>(options, std::move(router), std::move(journal),
                                              std::move(store), std::move(token)));
   BATON_TRY(service.restore_jobs());
+  BATON_TRY(service.farm_.history.happened(FarmEventKind::coordinator_started));
   return service;
 }
 
@@ -61,6 +62,8 @@ Status Service::run(const std::atomic<bool>& stop) {
   waits_ = std::make_unique<FileWaits>(farm_.options.disk, [this] { farm_.router.wake(); });
   while (!stop && !stop_requested_) BATON_TRY(turn());
   waits_.reset();
+  if (!stop_requested_) BATON_TRY(farm_.history.happened(FarmEventKind::coordinator_stopped));
+  BATON_TRY(farm_.journal.commit());
   // Who is told to stop the farm sends the workers home; who is merely ended, by a signal, will be
   // started again, and the workers wait for that.
   if (stop_requested_) {
@@ -80,6 +83,7 @@ Status Service::turn() {
     timeout = std::chrono::milliseconds(0);
   }
   BATON_TRY(handle_read());
+  farm_.history.set_actor({});
   start_inspections();
   if (Clock::now() >= next_tick_) {
     next_tick_ = Clock::now() + kTick;
@@ -138,7 +142,12 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
                                       farm_.store_directory.string(), farm_.token}));
   // A process that has only become impatient may not have received yet what it was granted.
   if (!is_new) return farm_.step(WorkerAlive{hello.worker_id, hello.running});
-  return farm_.step(WorkerJoined{hello.worker_id, hello.running});
+  BATON_TRY(farm_.history.happened(
+      FarmEventKind::worker_joined, hello.worker_id,
+      fmt::format("{} threads on {}, {}", hello.num_threads, hello.host, hello.renderer)));
+  const std::string renderer =
+      farm_.options.mixed_builds ? std::string() : hello.renderer + ", " + hello.build;
+  return farm_.step(WorkerJoined{hello.worker_id, hello.running, renderer});
 }
 
 /// Says where pixels of the worker may differ from those of the others; nullopt: nowhere.
@@ -209,16 +218,15 @@ void Service::keep_notes(const TaskDone& report) {
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
-  // A disk that takes nothing, as far as the coordinator sees, takes nothing from other workers.
-  const bool read_only = !message.no_space && writes_nowhere(farm_, message.lease);
-  const bool lacks_space = message.no_space || read_only;
-  if (!lacks_space && await_inputs(worker, message)) return {};
+  // What no worker could write is nobody's failure.
+  const std::optional<std::string> hindrance =
+      message.no_space ? "space" : find_hindrance(farm_, message.lease);
+  if (!hindrance && await_inputs(worker, message)) return {};
   BATON_TRY(farm_.reply_to(worker, ReportReceived{message.lease}));
-  if (lacks_space) {
+  if (hindrance) {
     const std::string waits =
-        fmt::format("{}: {}", read_only ? "a folder that can be written" : "space",
-                    message.message.substr(0, limits::kMaxTextLength));
-    spdlog::warn("job {} waits for {}", message.lease.job.short_hex(), waits);
+        fmt::format("{}: {}", *hindrance, message.message.substr(0, limits::kMaxTextLength));
+    spdlog::warn("job {} waits for {}", farm_.history.name_of(message.lease.job), waits);
     return farm_.step(SpaceLacking{worker, message.lease, waits});
   }
   // Inputs that are gone, damaged or cannot be read are nobody's fault: what made them is done
@@ -226,7 +234,7 @@ Status Service::receive_from(const std::string& worker, const TaskFailed& messag
   const std::optional<std::vector<BlobRef>> bad = find_bad_inputs(farm_, files_, message.lease);
   for (const BlobRef& input : bad.value_or(std::vector<BlobRef>())) {
     spdlog::warn("job {}: {} is gone, damaged or unreadable and is made again",
-                 message.lease.job.short_hex(), farm_.store.path(input.digest).string());
+                 farm_.history.name_of(message.lease.job), farm_.store.path(input.digest).string());
     if (const Status removed = farm_.store.remove(input.digest); !removed)
       spdlog::warn("{}", removed.error().message);
   }
@@ -248,7 +256,7 @@ Status Service::receive_from(const std::string& worker, const LeaseReturn& messa
   const std::string unseen = message.unseen.substr(0, limits::kMaxTextLength);
   if (!unseen.empty())
     tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,
-                     message.lease.job.short_hex(), unseen));
+                     farm_.history.name_of(message.lease.job), unseen));
   if (!unseen.empty()) {
     BATON_ASSIGN(const bool is_elsewhere, watch_folder(message.lease.job));
     if (is_elsewhere) return farm_.step(LeaseReturned{worker, message.lease});
@@ -263,6 +271,7 @@ Status Service::receive_from(const std::string&, const BlobsLeft& message) {
 Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
   spdlog::info("worker {} left", worker);
   farm_.peers.remove(worker);
+  BATON_TRY(farm_.history.happened(FarmEventKind::worker_left, worker));
   return farm_.step(WorkerLeft{worker});
 }
 
@@ -318,6 +327,7 @@ Status Service::handle(const Incoming& incoming) {
   }
   const std::string worker = farm_.peers.worker_of(peer);
   speaker_ = incoming.speaker;
+  farm_.history.set_actor(worker.empty() ? speaker_.name : worker);
   return std::visit(
       [&](const auto& message) -> Status {
         using M = std::decay_t<decltype(message)>;

@@ -69,12 +69,15 @@ Status Service::end_inspection(const FilesRead& read) {
   if (!found.lost.empty() && !std::filesystem::is_directory(folder, error))
     return farm_.step(
         JobPaused{digest, fmt::format("{}: the output folder is not there", folder.string())});
-  if (!found.unreadable.empty())
-    return farm_.step(JobPaused{digest, "a frame that can be read: " + found.unreadable});
 
   for (const std::string& file : found.lost_files)
     spdlog::warn("job {}: {} is gone, or not as it was written, and is made again",
-                 digest.short_hex(), file);
+                 farm_.history.name_of(digest), file);
+  if (!found.unreadable.empty()) {
+    // The others are made again once it goes on.
+    if (!found.lost.empty()) BATON_TRY(farm_.step(FramesInspected{digest, found.lost}));
+    return farm_.step(JobPaused{digest, "a frame that can be read: " + found.unreadable});
+  }
   if (found.lost.empty() && job->tasks.book().counts().open > 0) return {};
   return farm_.step(FramesInspected{digest, found.lost, strange_text(found.strange)});
 }

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "common/base/archive.h"
@@ -14,11 +16,27 @@
 #include "coordinator/service/submission.h"
 
 namespace baton {
+namespace {
+
+/// Error, io: something that is no folder stands in its place, or of a folder around it. A disk
+/// that takes nothing now is waited for.
+Status expect_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  const bool is_wrong = error == std::errc::not_a_directory || error == std::errc::file_exists ||
+                        error == std::errc::too_many_symbolic_link_levels;
+  if (!is_wrong || std::filesystem::is_directory(folder)) return {};
+  return Error{ErrorKind::io, fmt::format("{}: the output folder cannot be made: {}",
+                                          folder.string(), error.message())};
+}
+
+}  // namespace
 
 // ---- taking up the journal ----------------------------------------------------------------------
 
 Status Service::restore_jobs() {
   BATON_ASSIGN(farm_.owners, farm_.journal.owners());
+  BATON_TRY(farm_.history.read());
   BATON_TRY(farm_.take_up_marks());
   BATON_ASSIGN(const std::vector<Digest> jobs, farm_.journal.jobs());
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
@@ -36,6 +54,7 @@ Status Service::clean_up() {
   const std::size_t unfinished = farm_.store.clean_up();
   if (unfinished > 0)
     spdlog::info("{} files that were never finished are removed from the store", unfinished);
+  BATON_TRY(farm_.history.clean_up());
   if (has_unread_jobs_) return {};
   std::size_t count = 0;
   std::uint64_t bytes = 0;
@@ -60,8 +79,8 @@ Status Service::restore_job(const Digest& digest) {
   BATON_ASSIGN(JournalledJob known, farm_.journal.load(digest));
   Result<ParsedJobDocument> document = parse_job_document(known.document);
   if (!document) {
-    spdlog::error("job {} of the journal cannot be read and is left out: {}", digest.short_hex(),
-                  document.error().message);
+    spdlog::error("job {} of the journal cannot be read and is left out: {}",
+                  farm_.history.name_of(digest), document.error().message);
     has_unread_jobs_ = true;
     return {};
   }
@@ -69,6 +88,7 @@ Status Service::restore_job(const Digest& digest) {
                  std::move(known.failures)};
   event.spec.leading_runs = known.plan.leading_runs;
   event.plan = std::move(known.plan);
+  event.renderer = std::move(known.renderer);
 
   // An open job needs every file that it counts on. What cannot be looked at now is not gone: the
   // job waits to be resumed.
@@ -85,8 +105,8 @@ Status Service::restore_job(const Digest& digest) {
     lacks_mark = mark && lost.all_frames_right();
     if (mark && !lacks_mark && !lost.unreadable) lost.unreadable = mark;
     if (lost.unreadable) {
-      spdlog::error("job {} is paused, resume it when that is mended: {}", digest.short_hex(),
-                    *lost.unreadable);
+      spdlog::error("job {} is paused, resume it when that is mended: {}",
+                    farm_.history.name_of(digest), *lost.unreadable);
       event.status = JobStatus::paused;
       event.waits = *lost.unreadable;
       BATON_TRY(farm_.journal.record_status(digest, event.status));
@@ -104,7 +124,7 @@ Status Service::restore_job(const Digest& digest) {
   if (!is_open(status)) farm_.note_ended(digest);
   farm_.remove_job_file(digest, status);
   const JobProgress progress = farm_.scheduler.find_job(digest)->tasks.progress();
-  spdlog::info("job {} of the journal: {} of {} tasks are done", digest.short_hex(),
+  spdlog::info("job {} of the journal: {} of {} tasks are done", farm_.history.name_of(digest),
                progress.tasks_done, progress.tasks_total);
   return {};
 }
@@ -127,9 +147,9 @@ Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
   return farm_.reply(peer, JobDocument{message.job, std::move(*document), std::move(token)});
 }
 
-void Service::tell_lost(const Digest& job, const LostFiles& lost) {
+void Service::tell_lost(const Digest& job, const LostFiles& lost) const {
   if (lost.tasks.empty()) return;
-  spdlog::warn("job {}: {} is gone or has another size{}", job.short_hex(), lost.first,
+  spdlog::warn("job {}: {} is gone or has another size{}", farm_.history.name_of(job), lost.first,
                lost.tasks.size() > 1
                    ? fmt::format(", and something of {} more tasks", lost.tasks.size() - 1)
                    : "");
@@ -150,8 +170,10 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
         peer,
         {ErrorKind::bad_input,
          fmt::format("job {}: {} tasks, at most {}: use larger tiles or more frames per checkpoint",
-                     document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
+                     document->job.name, count, limits::kMaxTasksPerJob)});
   }
+  if (const Status folder = expect_folder(document->job.output.directory); !folder)
+    return farm_.refuse(peer, folder.error());
   BATON_ASSIGN(const std::optional<OddFrames> odd,
                await_frames(peer, message, document->digest, document->job));
   if (!odd) return {};
@@ -172,7 +194,7 @@ Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const
   const Incoming incoming{peer, message, speaker_};
   if (waits_->join(job, incoming, now)) return std::optional<OddFrames>();
   BATON_ASSIGN(const FolderRecord record, FolderRecord::read(farm_.journal, folder_of(spec)));
-  OddFrames odd = find_odd_frames(record, files_, spec);
+  OddFrames odd = find_odd_frames(record, files_, job, spec);
   if (odd.unread.empty()) return std::optional(std::move(odd));
   const std::string text = fmt::format("job '{}': looking at {} frames in {}", spec.name,
                                        odd.unread.size(), spec.output.directory);
@@ -183,32 +205,63 @@ Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const
 }
 
 Status Service::receive(const PeerId& peer, const ListJobs& message) {
-  JobList list;
+  const IdentityBook& known = farm_.history.jobs();
+  JobList list = list_workers();
   if (message.all) {
     BATON_ASSIGN(const std::vector<Bytes> ended,
                  farm_.journal.archived_summaries(limits::kMaxJobs));
     for (const Bytes& bytes : ended) {
       ArchiveReader reader(bytes);
-      reader(list.jobs.emplace_back());
-      if (!reader.complete()) {
-        list.jobs.pop_back();
-        continue;
-      }
-      list.jobs.back().owner = farm_.owner_of(list.jobs.back().job);
+      ListedJob job;
+      reader(job.summary);
+      if (reader.complete() && known.is_newest(job.summary.version))
+        list.jobs.push_back(std::move(job));
     }
   }
-  BATON_ASSIGN(list.num_ended, farm_.journal.num_archived());
-  for (const Digest& job : farm_.scheduler.jobs()) {
-    list.jobs.push_back(summarize(job, *farm_.scheduler.find_job(job)));
-    list.jobs.back().owner = farm_.owner_of(job);
+  std::uint64_t num_open = 0;
+  for (const Digest& version : farm_.scheduler.jobs()) {
+    const Scheduler::Job& job = *farm_.scheduler.find_job(version);
+    num_open += is_open(job.status) ? 1 : 0;
+    if (known.is_newest(version)) list.jobs.push_back({{}, summarize(version, job)});
   }
+  list.num_ended = known.num_jobs() - num_open;
+  for (ListedJob& job : list.jobs) {
+    job.identity = known.of(job.summary.version);
+    job.summary.owner = farm_.owner_of(job.summary.version);
+  }
+  return farm_.reply(peer, std::move(list));
+}
+
+/// Workers with what they do, and what they might do.
+JobList Service::list_workers() const {
+  JobList list;
   list.tasks_ready = farm_.scheduler.num_ready();
   list.task_seconds = farm_.scheduler.longest_task_seconds();
   list.workers = farm_.peers.summaries();
+  const TimePoint now = std::chrono::steady_clock::now();
   for (WorkerSummary& worker : list.workers) {
-    worker.leases =
-        static_cast<std::int32_t>(farm_.scheduler.leases().of_worker(worker.worker_id).size());
+    for (const LeaseBook::Place& place : farm_.scheduler.leases().of_worker(worker.worker_id)) {
+      const Lease& lease = farm_.scheduler.leases().at(place);
+      const Scheduler::Job& job = *farm_.scheduler.find_job(lease.id.job);
+      const std::chrono::duration<double> time = now - lease.granted_at;
+      worker.tasks.push_back({farm_.history.jobs().of(lease.id.job).id,
+                              place_of(job, lease.id.task, lease.id.attempt), time.count()});
+    }
+    std::ranges::stable_sort(worker.tasks, std::greater(), &TaskInHand::seconds);
   }
+  return list;
+}
+
+Status Service::receive(const PeerId& peer, const ListEvents& message) {
+  EventQuery query = message.query;
+  query.count = std::clamp(query.count, 1, limits::kMaxEventsTold);
+  if (!message.job.empty()) {
+    const Result<Digest> version = resolve(message.job);
+    if (!version) return farm_.refuse(peer, version.error());
+    query.job = farm_.history.jobs().of(*version).id;
+  }
+  EventList list;
+  BATON_ASSIGN(list.events, farm_.journal.events(query));
   return farm_.reply(peer, std::move(list));
 }
 
@@ -243,8 +296,9 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
     if (!odd) return {};
     BATON_ASSIGN(LostFiles lost, Submission(farm_, files_, speaker_).lost_files_of(*job));
     if (lost.unreadable) {
-      return farm_.refuse(peer, {ErrorKind::io, fmt::format("job {} stays paused: {}",
-                                                            job->short_hex(), *lost.unreadable)});
+      return farm_.refuse(
+          peer, {ErrorKind::io, fmt::format("job {} stays paused: {}", farm_.history.name_of(*job),
+                                            *lost.unreadable)});
     }
     tell_lost(*job, lost);
     const std::vector<std::string> reasons = lost_reasons(lost);
@@ -257,19 +311,23 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   const Result<Digest> job = resolve_own(message.job);
   if (!job) return farm_.refuse(peer, job.error());
+  const std::string name = farm_.history.name_of(*job);
   const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
   if (known != nullptr && is_open(known->status)) {
-    return farm_.refuse(
-        peer, {ErrorKind::usage, fmt::format("job {} is {}: cancel it first", job->short_hex(),
-                                             job_status_name(known->status))});
+    return farm_.refuse(peer, {ErrorKind::usage, fmt::format("job {} is {}: cancel it first", name,
+                                                             job_status_name(known->status))});
   }
-  BATON_TRY(farm_.archive_job(*job));
-  BATON_ASSIGN(const std::vector<Digest> kept, farm_.journal.kept_blobs(*job));
-  farm_.discard(kept);
-  BATON_TRY(farm_.journal.delete_job(*job));
-  farm_.owners.erase(*job);
-  farm_.remove_job_file(*job, JobStatus::cancelled);
-  spdlog::info("job {} is deleted", job->short_hex());
+  const JobId id = farm_.history.jobs().of(*job).id;
+  for (const Digest& version : farm_.history.jobs().versions(id)) {
+    BATON_TRY(farm_.archive_job(version));
+    BATON_ASSIGN(const std::vector<Digest> kept, farm_.journal.kept_blobs(version));
+    farm_.discard(kept);
+    BATON_TRY(farm_.journal.delete_job(version));
+    farm_.owners.erase(version);
+    farm_.remove_job_file(version, JobStatus::cancelled);
+  }
+  BATON_TRY(farm_.history.deleted(*job));
+  spdlog::info("job {} is deleted", name);
   return receive(peer, ListJobs{});
 }
 
@@ -280,12 +338,15 @@ Status Service::receive(const PeerId& peer, const DrainWorker& message) {
                          fmt::format("worker '{}': no worker has this name", message.worker_id)});
   }
   spdlog::info("worker {} is told to finish", message.worker_id);
+  farm_.peers.drain(message.worker_id);
+  BATON_TRY(farm_.history.happened(FarmEventKind::worker_drained, message.worker_id));
   BATON_TRY(farm_.reply_to(message.worker_id, Drain{}));
   return receive(peer, ListJobs{});
 }
 
 Status Service::receive(const PeerId& peer, const StopCoordinator&) {
   spdlog::info("asked to stop");
+  BATON_TRY(farm_.history.happened(FarmEventKind::coordinator_stopped));
   stop_requested_ = true;
   return farm_.reply(peer, Shutdown{});
 }
@@ -302,19 +363,22 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
 /// Describes a job that is known here or in the archive.
 Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
   if (farm_.scheduler.find_job(job) != nullptr) {
-    BATON_ASSIGN(JobDetail detail, farm_.living_detail(job));
-    detail.plan = std::move(plan);
-    detail.summary.owner = farm_.owner_of(job);
-    return farm_.reply(peer, std::move(detail));
+    ShownJob shown{farm_.history.jobs().of(job), {}};
+    shown.lacks_renderer =
+        farm_.scheduler.leases().nobody_renders_as(farm_.scheduler.find_job(job)->renderer);
+    BATON_ASSIGN(shown.detail, farm_.living_detail(job));
+    shown.detail.plan = std::move(plan);
+    shown.detail.summary.owner = farm_.owner_of(job);
+    return farm_.reply(peer, std::move(shown));
   }
   BATON_ASSIGN(std::optional<JobDetail> detail, farm_.archived_detail(job));
   if (!detail) {
-    return farm_.refuse(peer,
-                        {ErrorKind::bad_input,
-                         fmt::format("job {}: its document cannot be read", job.short_hex())});
+    return farm_.refuse(
+        peer, {ErrorKind::bad_input,
+               fmt::format("job {}: its document cannot be read", farm_.history.name_of(job))});
   }
   detail->summary.owner = farm_.owner_of(job);
-  return farm_.reply(peer, std::move(*detail));
+  return farm_.reply(peer, ShownJob{farm_.history.jobs().of(job), std::move(*detail)});
 }
 
 }  // namespace baton

@@ -11,6 +11,7 @@
 #include "common/base/archive.h"
 #include "common/base/limits.h"
 #include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 #include "coordinator/service/neighbour.h"
 #include "coordinator/service/plan_text.h"
 
@@ -32,13 +33,25 @@ Result<std::optional<FormerJob>> Submission::former_job(const Digest& digest) {
   return std::optional(std::move(former));
 }
 
-/// Makes room for a new job: a folder has one open job, and a frame in it belongs to the job that
-/// wrote it. Jobs of the same picture end and leave their work. Jobs of another picture whose
-/// frames would be replaced refuse the new one (bad_input, usage); with `restart` they end. Returns
-/// lines that say what is replaced, and why.
-Result<std::vector<std::string>> Submission::make_way(const ParsedJobDocument& document,
-                                                      bool restart) {
-  std::vector<std::string> reasons;
+/// The job that the document is, or becomes, a version of: the one that had it before, else the one
+/// of its name that the same speaker has in its folder, else a new one.
+Result<JobId> Submission::identify(const ParsedJobDocument& document) {
+  const IdentityBook& known = farm_.history.jobs();
+  if (const JobId before = known.of(document.digest).id; !before.empty()) return before;
+  BATON_ASSIGN(const std::vector<Digest> namesakes,
+               farm_.journal.jobs_in(folder_of(document.job), document.job.name));
+  const auto same =
+      std::ranges::find_if(namesakes.rbegin(), namesakes.rend(), [&](const Digest& v) {
+        return farm_.owner_of(v) == speaker_.name && !known.of(v).id.empty();
+      });
+  return same == namesakes.rend() ? JobId::draw() : known.of(*same).id;
+}
+
+/// What stands in the way of a new version of `job`: a folder has one open job, and a frame in it
+/// belongs to the job that wrote it. Errors (bad_input, usage): jobs of another picture whose
+/// frames would be replaced, without `restart`; another job that is open.
+Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocument& document,
+                                                           const JobId& job, bool restart) {
   std::vector<Neighbour> others;
   BATON_ASSIGN(const std::vector<Digest> neighbours,
                farm_.journal.jobs_in(folder_of(document.job)));
@@ -49,50 +62,69 @@ Result<std::vector<std::string>> Submission::make_way(const ParsedJobDocument& d
     BATON_ASSIGN(const std::optional<JobDetail> ended, farm_.archived_detail(digest));
     Neighbour other =
         look_at(*former, digest, document, files_, ended ? &ended->frames_done : nullptr);
-    if (other.busy && !restart) {
+    const bool is_former_version = farm_.history.jobs().of(digest).id == job;
+    if (other.busy && !restart && !is_former_version) {
       return Error{
           ErrorKind::bad_input,
           fmt::format("job '{}': job {} ('{}', {}) writes into {}: wait for its end, cancel "
                       "it, or choose another output.directory",
-                      document.job.name, digest.short_hex(), former->document.job.name,
+                      document.job.name, farm_.history.name_of(digest), former->document.job.name,
                       job_status_name(other.status), document.job.output.directory)};
     }
     if (!other.differing.empty() && !restart)
-      return another_picture(document.job, other, former->document.job);
+      return another_picture(document.job, other, former->document.job,
+                             farm_.history.name_of(digest));
     if (other.written.empty() && !other.busy) continue;
     if (is_open(other.status) || !other.differing.empty())
       BATON_TRY(farm_.check_own(speaker_, digest));
     others.push_back(std::move(other));
   }
+  return others;
+}
 
+/// Jobs of the same picture end and leave their work; those of another one end, too. Returns lines
+/// that say what is replaced, and why.
+Result<std::vector<std::string>> Submission::make_way(const ParsedJobDocument& document,
+                                                      const std::vector<Neighbour>& others) {
+  std::vector<std::string> reasons;
+  const std::string name = farm_.history.name_of(document.digest);
   for (const Neighbour& other : others) {
+    const std::string other_name = farm_.history.name_of(other.job);
     if (is_open(other.status)) {
-      spdlog::info("job {} makes way for job {}", other.job.short_hex(),
-                   document.digest.short_hex());
+      if (other_name != name) spdlog::info("job {} makes way for job {}", other_name, name);
       BATON_TRY(farm_.step(JobSuperseded{other.job, {}}));
       BATON_TRY(farm_.archive_job(other.job));
+      if (!other.left_out.empty())
+        reasons.push_back(
+            fmt::format("frames {} of {} are not rendered any more", format_frames(other.left_out),
+                        other_name == name ? "the version before" : "job " + other_name));
     }
     if (other.differing.empty()) continue;
-    BATON_TRY(disown(other.job, other.written));
-    reasons.push_back(fmt::format("{} of job {} {} replaced: {} differs",
-                                  other.written.size() == 1 ? "a frame" : "frames",
-                                  other.job.short_hex(), other.written.size() == 1 ? "is" : "are",
-                                  differing_text(other.differing)));
+    BATON_TRY(disown(other.job, other.written, name));
+    reasons.push_back(fmt::format(
+        "{} of job {} {} replaced: {} differs", other.written.size() == 1 ? "a frame" : "frames",
+        other_name, other.written.size() == 1 ? "is" : "are", differing_text(other.differing)));
   }
   return reasons;
 }
 
-/// Takes frames that another picture replaces off the record of a job in the archive.
-Status Submission::disown(const Digest& job, const std::vector<FrameNumber>& frames) {
+/// Takes frames that another picture replaces off those that a job in the archive has. What it was
+/// when it ended stays as it is.
+Status Submission::disown(const Digest& job, const std::vector<FrameNumber>& frames,
+                          const std::string& by) {
   BATON_ASSIGN(std::optional<JobDetail> detail, farm_.archived_detail(job));
   if (!detail) return {};
+  std::vector<FrameNumber> replaced;
   std::erase_if(detail->frames_done, [&](FrameNumber frame) {
-    return std::find(frames.begin(), frames.end(), frame) != frames.end();
+    const bool is_gone = std::ranges::find(frames, frame) != frames.end();
+    if (is_gone) replaced.push_back(frame);
+    return is_gone;
   });
-  JobSummary& summary = detail->summary;
-  summary.frames_done = static_cast<std::uint32_t>(detail->frames_done.size());
-  if (summary.status == JobStatus::done) summary.status = JobStatus::cancelled;
-  return farm_.journal.describe_archived(job, summary.status, to_bytes(summary), to_bytes(*detail));
+  if (replaced.empty()) return {};
+  detail->notes.push_back(
+      fmt::format("job {} has replaced frames {}", by, format_frames(replaced)));
+  return farm_.journal.describe_archived(job, detail->summary.status, to_bytes(detail->summary),
+                                         to_bytes(*detail));
 }
 
 // ---- submission ---------------------------------------------------------------------------------
@@ -100,11 +132,18 @@ Status Submission::disown(const Digest& job, const std::vector<FrameNumber>& fra
 Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
                           const SubmitJob& message) {
   const Scheduler::Job* const known = farm_.scheduler.find_job(document.digest);
-  if (known != nullptr) {
-    if (const Status own = farm_.check_own(speaker_, document.digest);
-        known->status != JobStatus::running && !own) {
+  if (known == nullptr || known->status != JobStatus::running) {
+    const bool is_new = farm_.history.jobs().of(document.digest).id.empty();
+    if (const Status own = farm_.check_own(speaker_, document.digest); !is_new && !own)
       return farm_.refuse(peer, own.error());
-    }
+  }
+  // What cannot go on, since nobody renders as it was rendered, begins again.
+  const bool begins_again = known != nullptr && message.restart &&
+                            farm_.scheduler.leases().nobody_renders_as(known->renderer);
+  if (begins_again) {
+    BATON_TRY(farm_.step(JobSuperseded{document.digest, {}}));
+    BATON_TRY(farm_.archive_job(document.digest));
+  } else if (known != nullptr) {
     return go_on(peer, document.digest, message.restart);
   }
 
@@ -113,25 +152,27 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
         peer, {ErrorKind::io,
                fmt::format("the farm is full: {} jobs that have not ended", limits::kMaxJobs)});
   }
-  Result<std::vector<std::string>> reasons = make_way(document, message.restart);
-  if (!reasons) {
-    const ErrorKind kind = reasons.error().kind;
-    if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return reasons.error();
-    return farm_.refuse(peer, reasons.error());
+  BATON_ASSIGN(const JobId id, identify(document));
+  const Result<std::vector<Neighbour>> others = find_neighbours(document, id, message.restart);
+  if (!others) {
+    const ErrorKind kind = others.error().kind;
+    if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return others.error();
+    return farm_.refuse(peer, others.error());
   }
-  return begin(peer, document, message.json, std::move(*reasons));
+  BATON_TRY(farm_.history.submitted(document.digest, id, message.restart ? "restart" : ""));
+  BATON_ASSIGN(std::vector<std::string> reasons, make_way(document, *others));
+  return begin(peer, document, message, std::move(reasons));
 }
 
 /// Starts a job with all that former ones of its picture leave to it.
 Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
-                         const std::string& text, std::vector<std::string> reasons) {
+                         const SubmitJob& message, std::vector<std::string> reasons) {
   const Digest digest = document.digest;
-  std::vector<Digest> formers;
-  BATON_ASSIGN(Adoption adoption, find_heritage(document, formers, reasons));
+  BATON_ASSIGN(const Heritage heritage, find_heritage(document, message.restart, reasons));
 
   JobAdded event{digest, document.job, JobStatus::running, {}, {}};
   BATON_ASSIGN(const std::optional<std::string> known, farm_.journal.document(digest));
-  BATON_TRY(take_over(adoption, formers, known ? "" : text, event));
+  BATON_TRY(take_over(heritage, known ? "" : message.json, event));
   LostFiles lost = find_lost_files(event, farm_.store, files_);
   const bool has_all = event.lost.empty() && lost.all_frames_right();
   for (std::string& reason : lost_reasons(lost)) {
@@ -149,14 +190,15 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
   const Scheduler::Job& job = *farm_.scheduler.find_job(digest);
   const std::string plan = plan_text(job, reasons);
   const bool already_there = known && !is_open(job.status) && event.lost.empty();
-  farm_.reply_at(place, peer, JobAccepted{digest, already_there, plan});
-  spdlog::info("job {} {}: '{}', {} of {} tasks are done", digest.short_hex(),
-               known ? "goes on" : "submitted", job.spec.name, job.tasks.progress().tasks_done,
-               job.tasks.progress().tasks_total);
-  if (!plan.empty()) spdlog::info("job {}: {}", digest.short_hex(), plan);
+  farm_.reply_at(place, peer,
+                 JobAccepted{farm_.history.jobs().of(digest), digest, already_there, plan});
+  const std::string name = farm_.history.name_of(digest);
+  spdlog::info("job {} {}: '{}', {} of {} tasks are done", name, known ? "goes on" : "submitted",
+               job.spec.name, job.tasks.progress().tasks_done, job.tasks.progress().tasks_total);
+  if (!plan.empty()) spdlog::info("job {}: {}", name, plan);
 
   // Blobs that the new job needs are not kept for the former ones any more.
-  for (const Digest& former : formers) {
+  for (const Digest& former : heritage.formers) {
     BATON_ASSIGN(const std::vector<Digest> kept, farm_.journal.kept_blobs(former));
     for (const Digest& blob : kept) {
       if (farm_.scheduler.is_referenced(blob)) BATON_TRY(farm_.journal.let_go(former, blob));
@@ -166,17 +208,25 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
 }
 
 /// What jobs of the same picture in the same folder leave to a new one, itself among them.
-Result<Adoption> Submission::find_heritage(const ParsedJobDocument& document,
-                                           std::vector<Digest>& digests,
-                                           std::vector<std::string>& reasons) {
+/// restart: nothing, where nobody who is connected renders as that was rendered.
+Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& document,
+                                                       bool restart,
+                                                       std::vector<std::string>& reasons) {
+  Heritage heritage;
   BATON_ASSIGN(const std::vector<Digest> neighbours,
                farm_.journal.jobs_in(folder_of(document.job)));
   std::vector<FormerJob> formers;
   for (const Digest& digest : neighbours) {
     BATON_ASSIGN(std::optional<FormerJob> former, former_job(digest));
     if (!former || !(former->document.picture == document.picture)) continue;
+    BATON_ASSIGN(const JournalledJob known, farm_.journal.load(digest));
+    if (restart && farm_.scheduler.leases().nobody_renders_as(known.renderer)) {
+      reasons.push_back("nothing is kept that was rendered with " + known.renderer);
+      continue;
+    }
+    if (!known.renderer.empty()) heritage.renderer = known.renderer;
     formers.push_back(std::move(*former));
-    digests.push_back(digest);
+    heritage.formers.push_back(digest);
   }
   const KeptFiles kept{
       .has_frame =
@@ -184,7 +234,8 @@ Result<Adoption> Submission::find_heritage(const ParsedJobDocument& document,
             return files_.is_right(frame_path(document.job, frame), image);
           },
       .has_blob = [&](const BlobRef& blob) { return farm_.store.contains(blob.digest); }};
-  Adoption adoption = adopt(document, formers, kept);
+  heritage.adoption = adopt(document, formers, kept);
+  const Adoption& adoption = heritage.adoption;
   if (!formers.empty()) {
     for (std::string& reason :
          output_reasons(formers.back().document.job, document.job, adoption.other_plates))
@@ -197,13 +248,14 @@ Result<Adoption> Submission::find_heritage(const ParsedJobDocument& document,
   }
   if (adoption.lost.size() > kMost)
     reasons.push_back(fmt::format("and {} frames more", adoption.lost.size() - kMost));
-  return adoption;
+  if (!adoption.former && adoption.images.empty()) heritage.renderer.clear();
+  return heritage;
 }
 
 /// Journals a job as if it had itself done what it adopts, and adds that to the event. text: the
 /// document; empty: the journal has it.
-Status Submission::take_over(const Adoption& adoption, const std::vector<Digest>& formers,
-                             const std::string& text, JobAdded& event) {
+Status Submission::take_over(const Heritage& heritage, const std::string& text, JobAdded& event) {
+  const Adoption& adoption = heritage.adoption;
   // Read before the journal changes, since the job may go on from itself. A kept frame has the
   // statistics of its assembly if that is the former job's.
   std::map<FrameIndex, BlobRef> images;
@@ -212,7 +264,7 @@ Status Submission::take_over(const Adoption& adoption, const std::vector<Digest>
   const std::set<FrameIndex> lost(adoption.lost.begin(), adoption.lost.end());
   std::vector<Completion> taken;
   if (adoption.former) {
-    const Digest& former = formers[*adoption.former];
+    const Digest& former = heritage.formers[*adoption.former];
     BATON_TRY(
         farm_.journal.for_each_completion(former, [&](const Completion& completion) -> Status {
           const bool is_assembly = completion.task.kind == TaskKind::assemble;
@@ -237,6 +289,8 @@ Status Submission::take_over(const Adoption& adoption, const std::vector<Digest>
     BATON_TRY(farm_.journal.add_job(event.job, text, {event.spec.name, folder_of(event.spec)}));
   }
   BATON_TRY(farm_.journal.record_plan(event.job, adoption.plan));
+  event.renderer = heritage.renderer;
+  if (!event.renderer.empty()) BATON_TRY(farm_.journal.record_renderer(event.job, event.renderer));
   if (!speaker_.name.empty() && !farm_.owners.contains(event.job)) {
     farm_.owners[event.job] = speaker_.name;
     BATON_TRY(farm_.journal.record_owner(event.job, speaker_.name));
@@ -256,8 +310,9 @@ Status Submission::go_on(const PeerId& peer, const Digest& digest, bool restart)
   BATON_ASSIGN(LostFiles lost, lost_files_of(digest, restart));
   if (lost.unreadable) {
     BATON_TRY(farm_.step(JobPaused{digest, *lost.unreadable}));
-    return farm_.refuse(peer, {ErrorKind::io, fmt::format("job {} is paused: {}",
-                                                          digest.short_hex(), *lost.unreadable)});
+    return farm_.refuse(
+        peer, {ErrorKind::io, fmt::format("job {} is paused: {}", farm_.history.name_of(digest),
+                                          *lost.unreadable)});
   }
   if (restart) BATON_TRY(farm_.mark_output_again(digest));
   const bool runs = farm_.scheduler.find_job(digest)->status == JobStatus::running;
@@ -269,7 +324,7 @@ Status Submission::go_on(const PeerId& peer, const Digest& digest, bool restart)
   if (!runs || !lost.tasks.empty())
     BATON_TRY(farm_.step(JobResumed{digest, std::move(lost.tasks)}));
   const std::string plan = plan_text(*farm_.scheduler.find_job(digest), reasons);
-  farm_.reply_at(place, peer, JobAccepted{digest, true, plan});
+  farm_.reply_at(place, peer, JobAccepted{farm_.history.jobs().of(digest), digest, true, plan});
   return {};
 }
 

@@ -10,6 +10,7 @@
 #include "coordinator/service/farm_core.h"
 #include "coordinator/service/file_table.h"
 #include "coordinator/service/job_report.h"
+#include "coordinator/service/neighbour.h"
 
 namespace baton {
 
@@ -29,15 +30,24 @@ class Submission {
 
  private:
   Result<std::optional<FormerJob>> former_job(const Digest& digest);
-  Result<std::vector<std::string>> make_way(const ParsedJobDocument& document, bool restart);
-  Status disown(const Digest& job, const std::vector<FrameNumber>& frames);
+  Result<JobId> identify(const ParsedJobDocument& document);
+  Result<std::vector<Neighbour>> find_neighbours(const ParsedJobDocument& document,
+                                                 const JobId& job, bool restart);
+  Result<std::vector<std::string>> make_way(const ParsedJobDocument& document,
+                                            const std::vector<Neighbour>& others);
+  Status disown(const Digest& job, const std::vector<FrameNumber>& frames, const std::string& by);
   Status go_on(const PeerId& peer, const Digest& digest, bool restart);
-  Status begin(const PeerId& peer, const ParsedJobDocument& document, const std::string& text,
+  Status begin(const PeerId& peer, const ParsedJobDocument& document, const SubmitJob& message,
                std::vector<std::string> reasons);
-  Result<Adoption> find_heritage(const ParsedJobDocument& document, std::vector<Digest>& digests,
+  /// What former jobs leave to a new one, and by what it was rendered.
+  struct Heritage {
+    std::vector<Digest> formers;
+    Adoption adoption;
+    std::string renderer;
+  };
+  Result<Heritage> find_heritage(const ParsedJobDocument& document, bool restart,
                                  std::vector<std::string>& reasons);
-  Status take_over(const Adoption& adoption, const std::vector<Digest>& formers,
-                   const std::string& text, JobAdded& event);
+  Status take_over(const Heritage& heritage, const std::string& text, JobAdded& event);
 
   FarmCore& farm_;
   FileTable& files_;

@@ -55,14 +55,15 @@ Status FarmJobRunner::submit(const JobSpec& job, std::size_t index, std::vector<
                ask_farm<JobAccepted>(*farm_, *client_, signals_,
                                      SubmitJob{std::move(document), /*restart=*/true}));
   if (!accepted) return stopped();
-  open.push_back({index, accepted->job});
+  open.push_back({index, accepted->identity.id});
   return {};
 }
 
 Result<JobSummary> FarmJobRunner::ask(Open& job, const JobSpec& spec) {
-  BATON_ASSIGN(const std::optional<JobDetail> detail,
-               ask_farm<JobDetail>(*farm_, *client_, signals_, ShowJob{job.job.hex()}));
-  if (!detail) return stopped();
+  BATON_ASSIGN(const std::optional<ShownJob> shown,
+               ask_farm<ShownJob>(*farm_, *client_, signals_, ShowJob{job.job.hex()}));
+  if (!shown) return stopped();
+  const JobDetail* const detail = &shown->detail;
   const JobSummary& summary = detail->summary;
   if (!detail->waits.empty() && job.waits.empty())
     spdlog::warn("run '{}' seed {} waits for {}", spec.name, spec.seed, detail->waits);

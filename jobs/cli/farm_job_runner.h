@@ -32,7 +32,7 @@ class FarmJobRunner final : public JobRunner {
  private:
   struct Open {
     std::size_t index = 0;
-    Digest job;
+    JobId job;
     std::string waits = {};  ///< for what, when it was asked last
   };
 

@@ -15,6 +15,11 @@ namespace {
 
 constexpr std::size_t kMostOdd = 5;
 
+/// null: it is not known, or has not come.
+ordered_json utc_json(std::int64_t time_ms) {
+  return time_ms == 0 ? ordered_json() : ordered_json(utc_iso(time_ms));
+}
+
 /// Appends the counters to an object.
 void add_sampling(const SamplingStats& s, ordered_json& object) {
   object["pixelsFresh"] = s.pixels_fresh;
@@ -85,11 +90,28 @@ ExitCode exit_code_of(const JobDetail& detail) {
   return has_strange_frames ? ExitCode::io : exit_code_of(status);
 }
 
-std::string job_line(const JobSummary& job) {
-  return fmt::format("{}  {:<9}  {:>11} frames  {:>15} tasks  {}", job.job.short_hex(),
+std::string job_line(const ListedJob& listed) {
+  const JobSummary& job = listed.summary;
+  return fmt::format("{}  {:<9}  {:>11} frames  {:>15} tasks  {}", listed.identity.id.short_hex(),
                      job_status_name(job.status),
                      fmt::format("{}/{}", job.frames_done, job.frames_total),
                      fmt::format("{}/{}", job.tasks_done, job.tasks_total), job.name);
+}
+
+std::string long_job_line(const ListedJob& listed) {
+  const JobTimes& times = listed.identity.times;
+  return fmt::format(
+      "{}\n          {:<12} priority {:>4}  submitted {}  started {}  ended {}", job_line(listed),
+      listed.summary.owner.empty() ? "nobody's" : listed.summary.owner, listed.summary.priority,
+      utc_text(times.submitted_ms), utc_text(times.started_ms), utc_text(times.ended_ms));
+}
+
+std::string times_text(const JobTimes& times) {
+  std::string text;
+  if (times.submitted_ms > 0) text += fmt::format("submitted  {}\n", utc_text(times.submitted_ms));
+  if (times.started_ms > 0) text += fmt::format("started    {}\n", utc_text(times.started_ms));
+  if (times.ended_ms > 0) text += fmt::format("ended      {}\n", utc_text(times.ended_ms));
+  return text;
 }
 
 std::string job_statistics(const JobSummary& job) {
@@ -173,22 +195,51 @@ std::string judgement_text(const JobDetail& detail) {
   return text;
 }
 
-std::string worker_line(const WorkerSummary& worker) {
-  return fmt::format("{:<24}  {:>3} threads  {:>3} leases  process {} on {}", worker.worker_id,
-                     worker.num_threads, worker.leases, worker.pid, worker.host);
+ordered_json place_json(const TaskPlace& place) {
+  return {{"task", task_name(place.kind)},
+          {"firstFrame", place.first.value()},
+          {"lastFrame", place.last.value()},
+          {"tile", place.tile},
+          {"attempt", place.attempt}};
+}
+
+std::string worker_lines(const WorkerSummary& worker) {
+  std::string text = fmt::format("{:<24}  {:>3} threads  {:>3} leases  process {} on {}{}",
+                                 worker.worker_id, worker.num_threads, worker.tasks.size(),
+                                 worker.pid, worker.host, worker.is_draining ? ", drains" : "");
+  for (const TaskInHand& task : worker.tasks)
+    text += fmt::format("\n  job {}  {}  for {}", task.job.short_hex(), place_text(task.task),
+                        duration_text(task.seconds));
+  return text;
 }
 
 ordered_json worker_json(const WorkerSummary& worker) {
+  ordered_json tasks = ordered_json::array();
+  for (const TaskInHand& task : worker.tasks) {
+    ordered_json row = {{"job", task.job.hex()}};
+    row.update(place_json(task.task));
+    row["seconds"] = task.seconds;
+    tasks.push_back(std::move(row));
+  }
   return {{"id", worker.worker_id},
           {"host", worker.host},
           {"pid", worker.pid},
           {"threads", worker.num_threads},
-          {"leases", worker.leases}};
+          {"leases", worker.tasks.size()},
+          {"draining", worker.is_draining},
+          {"tasks", std::move(tasks)}};
 }
 
-ordered_json summary_json(const JobSummary& job) {
+ordered_json summary_json(const ListedJob& listed) {
+  const JobSummary& job = listed.summary;
+  const JobIdentity& who = listed.identity;
   const RenderStats& s = job.stats;
-  ordered_json result = {{"id", job.job.hex()},
+  ordered_json result = {{"id", who.id.hex()},
+                         {"version", who.version},
+                         {"document", job.version.hex()},
+                         {"submitted", utc_json(who.times.submitted_ms)},
+                         {"started", utc_json(who.times.started_ms)},
+                         {"ended", utc_json(who.times.ended_ms)},
                          {"name", job.name},
                          {"owner", job.owner},
                          {"status", job_status_name(job.status)},
@@ -216,8 +267,9 @@ ordered_json summary_json(const JobSummary& job) {
   return result;
 }
 
-ordered_json detail_json(const JobDetail& detail) {
-  ordered_json result = summary_json(detail.summary);
+ordered_json detail_json(const ShownJob& job) {
+  const JobDetail& detail = job.detail;
+  ordered_json result = summary_json({job.identity, detail.summary});
   result["framesDoneNumbers"] = ordered_json::array();
   for (const FrameNumber frame : detail.frames_done)
     result["framesDoneNumbers"].push_back(frame.value());

@@ -14,7 +14,11 @@ ExitCode exit_code_of(JobStatus status);
 ExitCode exit_code_of(const JobDetail& detail);
 
 /// The job's line in a list.
-std::string job_line(const JobSummary& job);
+std::string job_line(const ListedJob& job);
+/// The same with owner, priority and times.
+std::string long_job_line(const ListedJob& job);
+/// When the job was submitted, started and ended, as far as that is known, a line each.
+std::string times_text(const JobTimes& times);
 
 /// What the job has done so far, several lines.
 std::string job_statistics(const JobSummary& job);
@@ -22,11 +26,13 @@ std::string job_statistics(const JobSummary& job);
 /// What is to be known of the frames that are written, several lines; empty: none is.
 std::string judgement_text(const JobDetail& detail);
 
-/// The worker's line in a list.
-std::string worker_line(const WorkerSummary& worker);
+/// The worker's line in a list, and one for each task that it has.
+std::string worker_lines(const WorkerSummary& worker);
 nlohmann::ordered_json worker_json(const WorkerSummary& worker);
+/// A task's kind, frames, tile and attempt.
+nlohmann::ordered_json place_json(const TaskPlace& place);
 
-nlohmann::ordered_json summary_json(const JobSummary& job);
-nlohmann::ordered_json detail_json(const JobDetail& detail);
+nlohmann::ordered_json summary_json(const ListedJob& job);
+nlohmann::ordered_json detail_json(const ShownJob& job);
 
 }  // namespace baton

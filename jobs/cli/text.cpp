@@ -1,8 +1,15 @@
 #include "jobs/cli/text.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <array>
+#include <charconv>
+#include <chrono>
 #include <cmath>
+#include <ctime>
+#include <string_view>
+#include <utility>
 
 namespace baton {
 
@@ -11,6 +18,43 @@ std::string duration_text(double seconds) {
   if (whole < 60) return fmt::format("{}s", whole);
   if (whole < 3600) return fmt::format("{}m{:02}s", whole / 60, whole % 60);
   return fmt::format("{}h{:02}m", whole / 3600, whole % 3600 / 60);
+}
+
+std::string utc_text(std::int64_t time_ms) {
+  if (time_ms == 0) return "-";
+  return fmt::format("{:%Y-%m-%d %H:%M:%S}Z",
+                     fmt::gmtime(static_cast<std::time_t>(time_ms / 1000)));
+}
+
+std::string utc_iso(std::int64_t time_ms) {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z",
+                     fmt::gmtime(static_cast<std::time_t>(time_ms / 1000)), time_ms % 1000);
+}
+
+std::int64_t now_ms() {
+  using namespace std::chrono;
+  return duration_cast<milliseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+Result<std::int64_t> parse_since(const std::string& text, std::int64_t now) {
+  std::int64_t count = 0;
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), count);
+  const std::string unit = fault == std::errc() ? std::string(end) : std::string();
+  constexpr std::array<std::pair<std::string_view, std::int64_t>, 4> kUnits{
+      {{"s", 1}, {"m", 60}, {"h", 3600}, {"d", 86400}}};
+  constexpr std::int64_t kMost = 1000000;
+  for (const auto& [name, seconds] : kUnits) {
+    if (unit == name && count >= 0 && count <= kMost) return now - 1000 * seconds * count;
+  }
+  for (const char* const form : {"%Y-%m-%dT%H:%M:%SZ", "%Y-%m-%dT%H:%M:%S", "%Y-%m-%d"}) {
+    std::tm time{};
+    const char* const rest = ::strptime(text.c_str(), form, &time);
+    if (rest != nullptr && *rest == '\0') return std::int64_t{1000} * ::timegm(&time);
+  }
+  return Error{ErrorKind::usage,
+               fmt::format("--since {}: expected 30s, 15m, 2h or 3d, or a time in UTC as "
+                           "2026-11-28T13:20:46",
+                           text)};
 }
 
 std::string exposure_text(float stops) {

@@ -122,7 +122,7 @@ Result<JobSummary> ask_job(RequestClient& client) {
   const auto* list = std::get_if<JobList>(&answer);
   if (list == nullptr || list->jobs.size() != 1)
     return Error{ErrorKind::internal, "no list of one job"};
-  return list->jobs.front();
+  return list->jobs.front().summary;
 }
 
 /// Asks until `wanted` of the job.
@@ -182,7 +182,7 @@ Result<Figures> measure(const LoadOptions& options) {
   // The workers.
   BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "farm" / "store"));
   LoadRun run{.job = job,
-              .digest = std::get<JobAccepted>(accepted).job,
+              .digest = std::get<JobAccepted>(accepted).version,
               .endpoint = endpoint,
               .key = worker_key,
               .tile_time = std::chrono::milliseconds(options.tile_ms),

@@ -2,7 +2,9 @@
 """Frames and folders that are harmed while a job runs: "done" means that every frame is there and right, without another
 submission."""
 
+import json
 import re
+import shutil
 import time
 
 from farm import IO, OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
@@ -90,7 +92,7 @@ def somebody_elses_picture_is_kept(programs, folder):
     with Farm(programs, folder / "farm") as farm:
         ident = begin(farm, folder)
         frame(folder, 2).write_bytes(painted)
-        words = ["frame.0002.exr is not what was written", "--restart"]
+        words = ["frame.0002.exr is not what a job has written", "--restart"]
         check_says(finish(farm, ident, expect=IO).stdout, *words)
         check_equal(farm.show(ident)["status"], "failed", "status")
         for command in (["submit", folder / "job.json"], ["retry", ident]):
@@ -114,8 +116,8 @@ def render_says_what_is_wrong(programs, folder):
     time.sleep(0.3)  # until it is reported
     frame(folder, 1).write_bytes(frame(other, 1).read_bytes())
     check_equal(running.wait(), IO, "exit code")
-    check_says(running.log(), "frame.0001.exr is not what was written", "--restart")
-    check_says(programs.run("baton", *command[1:], expect=IO).stderr, "frame.0001.exr is not what was written")
+    check_says(running.log(), "frame.0001.exr is not what a job has written", "--restart")
+    check_says(programs.run("baton", *command[1:], expect=IO).stderr, "frame.0001.exr is not what a job has written")
     programs.run("baton", *command[1:], "--restart")
     check_equal(sorted(programs.pixels(folder / "frames")), sorted(expected), "frames")
 
@@ -174,6 +176,74 @@ def a_frame_that_cannot_be_read_pauses_the_job(programs, folder):
         farm.baton("job", "resume", ident)
         farm.wait_for(ident)
     check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
+def what_nobody_here_has_written_is_not_replaced(programs, folder):
+    """A picture in the place of a frame that is still to be rendered: another program's, or of a job whose work folder is gone."""
+    expected = _undisturbed(programs, folder)
+    other = folder / "other"
+    programs.render(make(other, seed=77), other / "work", threads=2)
+    strange = frame(other, 3).read_bytes()
+
+    def refused(place, *arguments):
+        command = ["render", make(place, **dict(arguments)), "--work-dir", place / "work", "--threads-per-worker", "2"]
+        check_says(programs.run("baton", *command, expect=IO).stderr, "frame.0003.exr is not what a job has written", "--restart")
+        check_equal(frame(place, 3).read_bytes(), strange, "the other picture")
+        programs.run("baton", *command, "--restart")
+        check_equal(programs.pixels(place / "frames"), expected, f"pixels, {place.name}")
+
+    fresh = folder / "fresh"
+    frame(fresh, 3).parent.mkdir(parents=True)
+    frame(fresh, 3).write_bytes(strange)
+    refused(fresh)
+
+    longer = folder / "longer"
+    programs.render(make(longer, frames="1-2"), longer / "work", threads=2)
+    frame(longer, 3).write_bytes(strange)
+    refused(longer)
+
+    # A whole folder of them, of a job that nobody knows any more.
+    forgotten = folder / "forgotten"
+    programs.render(make(forgotten, seed=77), forgotten / "work", threads=2)
+    shutil.rmtree(forgotten / "work")
+    command = ["render", make(forgotten), "--work-dir", forgotten / "work"]
+    check_says(programs.run("baton", *command, expect=IO).stderr, "frame.0008.exr are not what a job has written")
+
+    # The same job again makes the same frames.
+    programs.render(make(forgotten, seed=77), forgotten / "work", threads=2)
+    check_equal(programs.pixels(forgotten / "frames"), programs.pixels(other / "frames"), "pixels of the same job")
+
+
+def a_folder_in_the_place_of_a_frame_is_waited_for(programs, folder):
+    expected = _undisturbed(programs, folder)
+    with Farm(programs, folder / "farm") as farm:
+        ident = begin(farm, folder)
+        frame(folder, FRAMES).mkdir()
+        farm.start_worker()
+        shown = wait_until(lambda: (lambda s: s if s.get("waits") else None)(farm.show(ident)), "it waits")
+        check_says(shown["waits"], f"frame.{FRAMES:04d}.exr is a folder")
+        check_equal((shown["status"], shown["failures"]), ("running", []), "a job that waits")
+        frame(folder, FRAMES).rmdir()
+        farm.wait_for(ident)
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
+def an_output_folder_that_cannot_be_made_is_refused(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        for name in ("file", "loop", "below"):
+            place = folder / name
+            path = make(place)
+            if name == "loop":
+                (place / "frames").symlink_to(place / "frames")
+            elif name == "file":
+                (place / "frames").write_text("", encoding="ascii")
+            else:
+                job = json.loads(path.read_text(encoding="utf-8"))
+                (place / "a").write_text("", encoding="ascii")
+                job["output"]["directory"] = str(place / "a/b")
+                path.write_text(json.dumps(job), encoding="utf-8")
+            check_says(farm.baton("job", "submit", path, expect=IO).stderr, "the output folder cannot be made")
+        check_equal(json.loads(farm.baton("job", "list", "--all", "--json").stdout)["jobs"], [], "jobs")
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ def a_job_from_submission_to_its_end(programs, folder):
 
         # The same job again is no new job.
         again = json.loads(farm.baton("job", "submit", path, "--json").stdout)
-        check_equal(again, {"id": job, "alreadyThere": True, "plan": "frames 1-2 are kept\n"}, "second submission")
+        check_equal(again, {"id": job, "version": 1, "alreadyThere": True, "plan": "frames 1-2 are kept\n"}, "second submission")
 
         # Deleted, it is known no longer; its frames stay.
         farm.baton("job", "delete", expect=USAGE)

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/check.h"
+#include "common/math/instruction_set.h"
 #include "worker/accel/accel.h"
 #include "worker/accel/allocation_count.h"
 #include "worker/accel/cut_outs.h"
@@ -354,7 +355,7 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene, const AccelLimit
   // One build thread: answers at edges depend on the shape of the tree, which must not depend on
   // the host.
   auto geometry = std::make_shared<SharedGeometry>();
-  geometry->device.reset(rtcNewDevice("threads=1"));
+  geometry->device.reset(rtcNewDevice(("threads=1" + embree_isa()).c_str()));
   RTCDevice device = geometry->device.get();
   if (device == nullptr) {
     return Error{ErrorKind::internal, "Embree: cannot make a device, error " +

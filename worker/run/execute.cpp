@@ -241,7 +241,8 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const BlobStore& st
     plate_image = std::move(plate.picture);
   }
   BATON_ASSIGN(const WrittenFrame written,
-               write_frame(loaded.job, loaded.digest, frame, std::move(image), plate_image));
+               write_frame(loaded.job, loaded.digest, frame, std::move(image), plate_image,
+                           [&] { return expect_output_folder(loaded); }));
   return TaskResult{.made = {.outputs = {written.file},
                              .frames = {{frame.value(), task.tile, {}, written.quality}}},
                     .notes = std::move(notes)};

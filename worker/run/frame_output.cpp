@@ -15,6 +15,7 @@
 #include "common/job/motion.h"
 #include "common/job/plan/sequence.h"
 #include "common/scene/camera.h"
+#include "worker/pass/tile_renderer.h"
 #include "worker/run/frame_quality.h"
 
 namespace baton {
@@ -139,6 +140,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
   ImageMetadata metadata{{"baton:version", kVersion},
                          {"baton:jobName", job.name},
                          {"baton:jobDigest", job_digest.hex()},
+                         {"baton:instructionSet", instruction_set()},
                          {"baton:frame", std::to_string(frame.value())},
                          {"baton:method", std::string(traits(job.sampling.method).name)}};
   const SamplingSpec& sampling = job.sampling;
@@ -188,7 +190,8 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
 }
 
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
-                                 FilmTile image, const std::optional<RgbImage>& plate) {
+                                 FilmTile image, const std::optional<RgbImage>& plate,
+                                 const std::function<Status()>& may_appear) {
   FrameQuality quality = judge_frame(image);
   float noise = cycles_noise(image);
   if (job.output.clamp_negative) clamp_negative(image);
@@ -222,9 +225,11 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
                            .frame_number = number.value(),
                            .naming = naming_of(job),
                            .display_window = job.image.whole()}));
-  BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
-    return verify_frame(temporary, image, frame.value());
-  }));
+  const auto check = [&](const std::filesystem::path& temporary) -> Status {
+    const Status verified = verify_frame(temporary, image, frame.value());
+    return verified && may_appear ? may_appear() : verified;
+  };
+  BATON_TRY(write_file_verified(path, bytes, check));
   return WrittenFrame{{BlobKind::image, frame.value(), 0, digest_of(bytes), bytes.size()}, quality};
 }
 

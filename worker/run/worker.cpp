@@ -131,6 +131,8 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
       return TaskResult{.made = {}, .unseen = seen.error().message};
     }
     Result<TaskResult> frame = execute_task(*loaded, *task.store, task.grant, stop);
+    if (const Status seen = expect_output_folder(*loaded); !frame && !seen)
+      return TaskResult{.made = {}, .unseen = seen.error().message};
     if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
     return frame;
   }

@@ -12,6 +12,7 @@
 #include "common/protocol/keys.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/farm/events_command.h"
 #include "jobs/cli/farm/slurm_farm.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/render/render_session.h"
@@ -168,7 +169,7 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
 Result<ExitCode> show_status(const CoordinatorLink& link) {
   BATON_ASSIGN(RequestClient client, link.connect());
   BATON_ASSIGN(const JobList list, ask<JobList>(client, ListJobs{}));
-  for (const JobSummary& job : list.jobs) fmt::print("{}\n", job_line(job));
+  for (const ListedJob& job : list.jobs) fmt::print("{}\n", job_line(job));
   fmt::print("{} jobs, {} tasks are ready\n\n", list.jobs.size(), list.tasks_ready);
 
   std::multimap<std::string, const WorkerSummary*> of_pilots;
@@ -192,13 +193,13 @@ Result<ExitCode> show_status(const CoordinatorLink& link) {
     };
     const auto [first, last] = of_pilots.equal_range(pilot.id);
     if (first == last) print("no worker");
-    for (auto worker = first; worker != last; ++worker) print(worker_line(*worker->second));
+    for (auto worker = first; worker != last; ++worker) print(worker_lines(*worker->second));
     of_pilots.erase(first, last);
   }
   for (const auto& [id, worker] : of_pilots)
     fmt::print("pilot {:<10} {:<10} {:<10} {:>10}       {}\n", id, "", "not in the queue", "",
-               worker_line(*worker));
-  for (const WorkerSummary* const worker : others) fmt::print("{}\n", worker_line(*worker));
+               worker_lines(*worker));
+  for (const WorkerSummary* const worker : others) fmt::print("{}\n", worker_lines(*worker));
   fmt::print("{} pilots, {} workers\n", count, list.workers.size());
   return ExitCode::ok;
 }
@@ -265,6 +266,7 @@ void add_farm_command(CLI::App& app, ExitCode& code) {
   CLI::App* farm = app.add_subcommand("farm", "Farms of several machines");
   farm->require_subcommand(1);
   add_slurm_command(*farm, code);
+  add_events_command(*farm, code);
 
   auto link = std::make_shared<CoordinatorLink>();
   CLI::App* status =

@@ -28,13 +28,14 @@ constexpr std::chrono::minutes kWaitPatience{5};
 
 struct JobOptions {
   CoordinatorLink link;
-  std::string job;                        ///< name, digest or its beginning
+  std::string job;                        ///< name, ID or its beginning
   JobArgument wanted;                     ///< submit
   double timeout_s = 0;                   ///< wait; 0: none
   bool restart = false;                   ///< submit
   std::optional<FrameNumber> from_frame;  ///< submit
   int rounds = 0;                         ///< refine; 0: as many as a sweep has
   bool all = false;                       ///< list
+  bool is_long = false;                   ///< list
   bool all_ended = false;                 ///< delete
   bool json = false;
 };
@@ -42,11 +43,12 @@ struct JobOptions {
 /// What became of a job that was handed in.
 void print_accepted(const JobAccepted& accepted, bool json) {
   if (json)
-    return fmt::print("{}\n", ordered_json{{"id", accepted.job.hex()},
+    return fmt::print("{}\n", ordered_json{{"id", accepted.identity.id.hex()},
+                                           {"version", accepted.identity.version},
                                            {"alreadyThere", accepted.already_there},
                                            {"plan", accepted.plan}}
                                   .dump(2));
-  fmt::print("{}\n", accepted.job.hex());
+  fmt::print("{}\n", accepted.identity.id.hex());
   if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
   fmt::print(stderr, "{}", accepted.plan);
 }
@@ -77,7 +79,8 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
 Result<ExitCode> list(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{options.all}));
   if (!options.json) {
-    for (const JobSummary& job : found.jobs) fmt::print("{}\n", job_line(job));
+    for (const ListedJob& job : found.jobs)
+      fmt::print("{}\n", options.is_long ? long_job_line(job) : job_line(job));
     fmt::print("{} jobs, {} workers", found.jobs.size(), found.workers.size());
     if (!options.all && found.num_ended > 0)
       fmt::print("; --all shows {} that have ended", found.num_ended);
@@ -85,7 +88,7 @@ Result<ExitCode> list(const JobOptions& options, RequestClient& client) {
     return ExitCode::ok;
   }
   ordered_json result = {{"jobs", ordered_json::array()}, {"workers", ordered_json::array()}};
-  for (const JobSummary& job : found.jobs) result["jobs"].push_back(summary_json(job));
+  for (const ListedJob& job : found.jobs) result["jobs"].push_back(summary_json(job));
   for (const WorkerSummary& worker : found.workers) {
     result["workers"].push_back(worker_json(worker));
   }
@@ -93,11 +96,14 @@ Result<ExitCode> list(const JobOptions& options, RequestClient& client) {
   return ExitCode::ok;
 }
 
-void print_detail(const JobDetail& detail, bool json) {
-  if (json) return fmt::print("{}\n", detail_json(detail).dump(2));
-  fmt::print("{}\n", job_line(detail.summary));
+void print_detail(const ShownJob& job, bool json) {
+  const JobDetail& detail = job.detail;
+  if (json) return fmt::print("{}\n", detail_json(job).dump(2));
+  fmt::print("{}\n", job_line({job.identity, detail.summary}));
   fmt::print("output     {}\n", detail.summary.output_directory);
   if (!detail.summary.owner.empty()) fmt::print("owner      {}\n", detail.summary.owner);
+  fmt::print("{}", times_text(job.identity.times));
+  if (job.identity.version > 1) fmt::print("version    {}\n", job.identity.version);
   if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
   fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
   if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
@@ -106,34 +112,33 @@ void print_detail(const JobDetail& detail, bool json) {
 }
 
 Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobDetail detail, ask<JobDetail>(client, ShowJob{options.job}));
-  print_detail(detail, options.json);
+  BATON_ASSIGN(const ShownJob job, ask<ShownJob>(client, ShowJob{options.job}));
+  print_detail(job, options.json);
   return ExitCode::ok;
 }
 
 /// A job that is waited for, with the sweeps that it gets meanwhile.
 class GrowingJob {
  public:
-  /// After the job is done: the ID of the job that has more sweeps, or nullopt: there are enough,
-  /// or only its owner may add some. After an error `timeout` it can be asked again.
-  Result<std::optional<std::string>> grow(const Digest& job, RequestClient& client) {
+  /// After the job is done: whether it gets more sweeps. False: there are enough, or only its owner
+  /// may add some. After an error `timeout` it can be asked again.
+  Result<bool> grow(const Digest& version, RequestClient& client) {
     if (!more_) {
-      const Result<JobDocument> document = ask<JobDocument>(client, JobDocumentRequest{job});
-      if (!document && document.error().kind == ErrorKind::usage)
-        return std::optional<std::string>();
+      const Result<JobDocument> document = ask<JobDocument>(client, JobDocumentRequest{version});
+      if (!document && document.error().kind == ErrorKind::usage) return false;
       if (!document) return document.error();
       BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document->json));
       spec_ = std::move(parsed.job);
       more_.emplace(spec_, false);
     }
     if (next_.empty()) {
-      if (!more_->add_to(spec_)) return std::optional<std::string>();
+      if (!more_->add_to(spec_)) return false;
       BATON_ASSIGN(next_, make_job_document(spec_));
     }
     BATON_ASSIGN(const JobAccepted accepted, ask<JobAccepted>(client, SubmitJob{next_}));
     next_.clear();
     fmt::print(stderr, "{}", accepted.plan);
-    return std::optional(accepted.job.hex());
+    return true;
   }
 
  private:
@@ -150,7 +155,7 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   std::string told;               // what it waits for
   GrowingJob growing;
   for (;;) {
-    const Result<JobDetail> answer = ask<JobDetail>(client, ShowJob{job});
+    const Result<ShownJob> answer = ask<ShownJob>(client, ShowJob{job});
     const std::chrono::duration<double> waited = Clock::now() - start;
     if (!answer) {
       const bool away = answer.error().kind == ErrorKind::timeout && last_answer &&
@@ -162,20 +167,19 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
     }
 
     last_answer = Clock::now();
-    job = answer->summary.job.hex();
-    const JobDetail& detail = *answer;
+    job = answer->identity.id.hex();
+    const JobDetail& detail = answer->detail;
     const bool expired = options.timeout_s > 0 && waited.count() >= options.timeout_s;
     if (detail.summary.status == JobStatus::done && !expired) {
-      const Result<std::optional<std::string>> next = growing.grow(detail.summary.job, client);
-      if (!next && next.error().kind != ErrorKind::timeout) return next.error();
-      if (next && *next) job = **next;
-      if (!next || *next) {
+      const Result<bool> grows = growing.grow(detail.summary.version, client);
+      if (!grows && grows.error().kind != ErrorKind::timeout) return grows.error();
+      if (!grows || *grows) {
         std::this_thread::sleep_for(kPollInterval);
         continue;
       }
     }
     if (!is_open(detail.summary.status) || expired) {
-      print_detail(detail, options.json);
+      print_detail(*answer, options.json);
       return is_open(detail.summary.status) ? ExitCode::timeout : exit_code_of(detail);
     }
     if (const std::string waits = std::exchange(told, detail.waits); waits != told && !told.empty())
@@ -185,42 +189,41 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
 }
 
 /// What became of a job, and a word where nothing did: one that is done cannot be paused.
-void print_change(const JobDetail& before, const JobDetail& after, bool json) {
+void print_change(const ShownJob& before, const ShownJob& after, bool json) {
   print_detail(after, json);
-  if (before.summary.status != after.summary.status) return;
-  fmt::print(stderr, "nothing changed: the job was {} before\n",
-             job_status_name(before.summary.status));
+  const JobStatus status = before.detail.summary.status;
+  if (status != after.detail.summary.status) return;
+  fmt::print(stderr, "nothing changed: the job was {} before\n", job_status_name(status));
 }
 
 /// M: CancelJob, PauseJob or ResumeJob.
 template <class M>
 Result<ExitCode> change(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
-  BATON_ASSIGN(const JobDetail after,
-               ask_until_done<JobDetail>(client, M{before.summary.job.hex()}));
-  fmt::print(stderr, "{}", after.plan);
+  BATON_ASSIGN(const ShownJob before, ask<ShownJob>(client, ShowJob{options.job}));
+  BATON_ASSIGN(const ShownJob after, ask_until_done<ShownJob>(client, M{before.identity.id.hex()}));
+  fmt::print(stderr, "{}", after.detail.plan);
   print_change(before, after, options.json);
   return ExitCode::ok;
 }
 
 /// Submits the job's own document again: what is done stays done, failures are forgotten.
 Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
-  const Digest& id = before.summary.job;
-  BATON_ASSIGN(JobDocument document, ask<JobDocument>(client, JobDocumentRequest{id}));
+  BATON_ASSIGN(const ShownJob before, ask<ShownJob>(client, ShowJob{options.job}));
+  BATON_ASSIGN(JobDocument document,
+               ask<JobDocument>(client, JobDocumentRequest{before.detail.summary.version}));
   BATON_ASSIGN(const JobAccepted accepted,
                ask_until_done<JobAccepted>(client, SubmitJob{std::move(document.json)}));
   fmt::print(stderr, "{}", accepted.plan);
-  BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, ShowJob{id.hex()}));
+  BATON_ASSIGN(const ShownJob after, ask<ShownJob>(client, ShowJob{before.identity.id.hex()}));
   print_change(before, after, options.json);
   return ExitCode::ok;
 }
 
 /// Submits the job with more sweeps: those that it has stay, and frames become the mean of all.
 Result<ExitCode> refine(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
+  BATON_ASSIGN(const ShownJob before, ask<ShownJob>(client, ShowJob{options.job}));
   BATON_ASSIGN(const JobDocument document,
-               ask<JobDocument>(client, JobDocumentRequest{before.summary.job}));
+               ask<JobDocument>(client, JobDocumentRequest{before.detail.summary.version}));
   BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document.json));
   QualitySpec& quality = parsed.job.quality;
   const int rounds = options.rounds > 0 ? options.rounds : quality.rounds;
@@ -251,16 +254,25 @@ Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
   if (options.all_ended) {
     jobs.clear();
     BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{true}));
-    for (const JobSummary& job : found.jobs) {
-      if (!is_open(job.status)) jobs.push_back(job.job.hex());
+    for (const ListedJob& job : found.jobs) {
+      if (!is_open(job.summary.status)) jobs.push_back(job.identity.id.hex());
     }
   }
-  for (const std::string& job : jobs) BATON_TRY(ask<JobList>(client, DeleteJob{job}));
-  if (options.json) {
-    fmt::print("{}\n", ordered_json{{"deleted", jobs.size()}}.dump(2));
-  } else {
-    fmt::print("{} jobs are deleted; their frames stay\n", jobs.size());
+  // Of all that have ended, those of others stay.
+  std::size_t num_others = 0;
+  for (const std::string& job : jobs) {
+    const Result<JobList> deleted = ask<JobList>(client, DeleteJob{job});
+    const bool is_others = !deleted && deleted.error().kind == ErrorKind::usage;
+    if (!deleted && !(is_others && options.all_ended)) return deleted.error();
+    num_others += is_others ? 1 : 0;
   }
+  const std::size_t num_deleted = jobs.size() - num_others;
+  if (options.json) {
+    fmt::print("{}\n", ordered_json{{"deleted", num_deleted}, {"others", num_others}}.dump(2));
+    return ExitCode::ok;
+  }
+  fmt::print("{} jobs are deleted; their frames stay\n", num_deleted);
+  if (num_others > 0) fmt::print("{} jobs of others stay\n", num_others);
   return ExitCode::ok;
 }
 
@@ -280,7 +292,9 @@ void add_job_command(CLI::App& app, ExitCode& code) {
       "Examples:\n"
       "  baton job submit job.json --coordinator tcp://farm:5570\n"
       "  baton job wait 3f2a --timeout 600 && echo done\n"
-      "An ID is the digest that submit prints, its beginning, or the name of a job.");
+      "An ID is what submit prints, its beginning, or the name of a job. It stays while the job "
+      "is\n"
+      "changed: the same name in the same folder, by the same user, is the same job.");
 
   // No two commands share an option: CLI11 reads the environment for those that were not called,
   // too.
@@ -308,6 +322,7 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   const auto [lists, wanted] =
       add("list", "The jobs of the coordinator that have not ended", "", list);
   lists->add_flag("--all", wanted->all, "also those that have ended");
+  lists->add_flag("-l,--long", wanted->is_long, "with owner, priority and times (UTC)");
   add("show", "One job: progress, statistics, failures", "ID", show);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
       change<PauseJob>);
@@ -317,7 +332,7 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   const auto [refines, refinement] =
       add("refine",
           "Adds rounds to a job: its frames become the mean of those and of the new ones; prints "
-          "the new ID",
+          "its ID",
           "ID", refine);
   refines
       ->add_option("--rounds", refinement->rounds,

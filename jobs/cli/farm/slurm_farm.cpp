@@ -70,15 +70,15 @@ SlurmSnapshot SlurmFarm::observe(const JobList& list, std::vector<SlurmPilot> pi
     ids.insert(*id);
     names.insert(worker.worker_id);
     threads_per_pilot_ = worker.num_threads;
-    seen.workers.push_back(
-        {*id, worker.worker_id, worker.leases, told_to_end_.contains(worker.worker_id)});
+    seen.workers.push_back({*id, worker.worker_id, static_cast<std::int32_t>(worker.tasks.size()),
+                            told_to_end_.contains(worker.worker_id)});
   }
   std::erase_if(told_to_end_, [&](const std::string& name) { return !names.contains(name); });
   seen.threads_per_pilot = threads_per_pilot_;
 
   // The most work of the last looks: a short lull sends nobody home.
   std::uint64_t tasks = list.tasks_ready;
-  for (const JobSummary& job : list.jobs) tasks += job.tasks_leased;
+  for (const ListedJob& job : list.jobs) tasks += job.summary.tasks_leased;
   tasks_.push_back(tasks);
   if (tasks_.size() > kLooksBeforeShrinking) tasks_.pop_front();
   seen.tasks = *std::max_element(tasks_.begin(), tasks_.end());

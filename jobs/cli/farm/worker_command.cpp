@@ -21,7 +21,7 @@ void print_workers(const std::vector<WorkerSummary>& workers, bool json) {
     for (const WorkerSummary& worker : workers) list.push_back(worker_json(worker));
     return fmt::print("{}\n", list.dump(2));
   }
-  for (const WorkerSummary& worker : workers) fmt::print("{}\n", worker_line(worker));
+  for (const WorkerSummary& worker : workers) fmt::print("{}\n", worker_lines(worker));
   fmt::print("{} workers\n", workers.size());
 }
 
@@ -54,7 +54,7 @@ void add_worker_command(CLI::App& app, ExitCode& code) {
     });
     return std::pair(command, options.get());
   };
-  add("list", "All connected workers and what they hold",
+  add("list", "All connected workers, and what each does for how long",
       [](const WorkerCommandOptions&) { return ListJobs{}; });
   const auto [drain, drained] =
       add("drain", "Lets a worker finish what it renders, then end; its other tasks go to others",

@@ -72,6 +72,10 @@ void add_render_command(CLI::App& app, ExitCode& code) {
       ->add_option("--memory", options->memory_mib,
                    "MiB that all workers together may use, about; default: half of the machine's")
       ->check(CLI::Range(1, 1 << 30));
+  command
+      ->add_option("--isa", options->isa,
+                   "instruction set of the workers: auto, sse4, avx2 or avx512; default: auto")
+      ->check(CLI::IsMember({"auto", "sse4", "avx2", "avx512"}));
   command->add_option("--work-dir", options->work_directory,
                       "journal, blobs and logs; default: .baton in the output folder");
   add_store_limit_option(*command, options->store_limit_mib);

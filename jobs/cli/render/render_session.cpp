@@ -60,6 +60,7 @@ FarmOptions farm_options(const RenderOptions& options, const JobSpec& job) {
       fs::absolute(options.work_directory.empty() ? fs::path(job.output.directory) / ".baton"
                                                   : fs::path(options.work_directory));
   farm.store_limit_mib = options.store_limit_mib;
+  farm.isa = options.isa;
   return farm;
 }
 
@@ -80,48 +81,50 @@ Result<RenderSession> RenderSession::start(const RenderOptions& options, const F
 }
 
 /// Follows the job to its end, reading finished frames for the sheet.
-Result<std::optional<JobDetail>> RenderSession::follow(const Digest& job, FrameSheet& sheet,
-                                                       const std::function<bool()>& interrupted) {
+Result<std::optional<ShownJob>> RenderSession::follow(const JobId& job, FrameSheet& sheet,
+                                                      const std::function<bool()>& interrupted) {
   Progress progress(::isatty(STDERR_FILENO) == 1);
   std::string waits;
   for (;;) {
-    BATON_ASSIGN(std::optional<JobDetail> detail,
-                 ask_farm<JobDetail>(farm_, client_, signals_, ShowJob{job.hex()}));
-    if (detail) {
-      for (const std::string& note : warnings_.fresh(detail->notes)) {
+    BATON_ASSIGN(std::optional<ShownJob> shown,
+                 ask_farm<ShownJob>(farm_, client_, signals_, ShowJob{job.hex()}));
+    if (shown) {
+      for (const std::string& note : warnings_.fresh(shown->detail.notes)) {
         progress.finish();
         spdlog::warn("{}", note);
       }
-      progress.update(detail->summary, Clock::now());
-      if (!detail->waits.empty() && waits.empty() && !(detail->lacks_room && farm_.is_own())) {
+      progress.update(shown->detail.summary, Clock::now());
+      if (!shown->detail.waits.empty() && waits.empty() &&
+          !((shown->detail.lacks_room || shown->lacks_renderer) && farm_.is_own())) {
         progress.finish();
-        spdlog::warn("waits for {}", detail->waits);
+        spdlog::warn("waits for {}", shown->detail.waits);
       }
-      waits = detail->waits;
-      sheet.add(detail->frames_done);
+      waits = shown->detail.waits;
+      sheet.add(shown->detail.frames_done);
     }
     // Who paused it, if not the person before this terminal, will not resume it. In a farm of its
     // own nobody makes room either.
-    const bool over = !detail || detail->summary.status != JobStatus::running ||
-                      (detail->lacks_room && farm_.is_own());
+    const bool is_stuck = shown && (shown->detail.lacks_room || shown->lacks_renderer);
+    const bool over = !shown || shown->detail.summary.status != JobStatus::running ||
+                      (is_stuck && farm_.is_own());
     if (over || interrupted() || signals_.stop_requested_within(kFarmPollInterval)) {
       progress.finish();
-      return over ? detail : std::nullopt;
+      return over ? shown : std::nullopt;
     }
     BATON_TRY(farm_.tend());
   }
 }
 
 /// Renders the job as it is.
-Result<std::optional<JobDetail>> RenderSession::render_sweeps(
+Result<std::optional<ShownJob>> RenderSession::render_sweeps(
     const JobSpec& job, bool restart, FrameSheet& sheet, const std::function<bool()>& interrupted) {
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(
       const std::optional<JobAccepted> accepted,
       ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{std::move(document), restart}));
-  if (!accepted) return std::optional<JobDetail>();
+  if (!accepted) return std::optional<ShownJob>();
   fmt::print(stderr, "{}", accepted->plan);
-  return follow(accepted->job, sheet, interrupted);
+  return follow(accepted->identity.id, sheet, interrupted);
 }
 
 Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart,
@@ -130,27 +133,29 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
   warnings_.begin(job);
   MoreSweeps more(job, restart);
   std::optional<FrameSheet> sheet;
-  std::optional<JobDetail> detail;
+  std::optional<ShownJob> shown;
   for (bool is_first = true;; is_first = false) {
     sheet.emplace(job);
-    BATON_ASSIGN(detail, render_sweeps(job, restart && is_first, *sheet, interrupted));
-    if (!detail) return std::optional<JobStatus>();
-    if (detail->summary.status != JobStatus::done || !more.add_to(job)) break;
+    BATON_ASSIGN(shown, render_sweeps(job, restart && is_first, *sheet, interrupted));
+    if (!shown) return std::optional<JobStatus>();
+    if (shown->detail.summary.status != JobStatus::done || !more.add_to(job)) break;
   }
-  const JobStatus status = detail->summary.status;
+  const JobStatus status = shown->detail.summary.status;
   if (options_.json) {
-    fmt::print("{}\n", detail_json(*detail).dump(2));
+    fmt::print("{}\n", detail_json(*shown).dump(2));
   } else {
-    print_result(job, *detail, std::chrono::duration<double>(Clock::now() - start).count());
+    print_result(job, shown->detail, std::chrono::duration<double>(Clock::now() - start).count());
   }
   write_sheet(*sheet, options_.display, options_.json);
   if (status == JobStatus::done) BATON_TRY(write_png_of(job));
-  if (status == JobStatus::failed) print_failures(*detail);
-  if (status == JobStatus::paused || detail->lacks_room)
+  if (status == JobStatus::failed) print_failures(shown->detail);
+  if (shown->lacks_renderer && farm_.is_own())
+    return Error{ErrorKind::version, "the job waits for " + shown->detail.waits};
+  if (status == JobStatus::paused || shown->detail.lacks_room)
     fmt::print(stderr, "{}: the job waits for {}\nto go on: the same command\n",
-               status == JobStatus::paused ? "paused" : "stopped", detail->waits);
+               status == JobStatus::paused ? "paused" : "stopped", shown->detail.waits);
   std::fflush(stdout);
-  if (exit_code_of(*detail) == ExitCode::io) return Error{ErrorKind::io, detail->waits};
+  if (exit_code_of(shown->detail) == ExitCode::io) return Error{ErrorKind::io, shown->detail.waits};
   return std::optional(status);
 }
 

@@ -17,6 +17,7 @@ struct RenderOptions {
   JobArgument job;
   /// 0: one, whose threads share scene and light.
   int workers = 0;
+  std::string isa;                    ///< empty: as the environment says
   int threads_per_worker = 0;         ///< 0: the processors shared out
   std::uint64_t memory_mib = 0;       ///< for all workers; 0: half of all
   std::string work_directory;         ///< empty: .baton in the output folder
@@ -65,11 +66,11 @@ class RenderSession {
   void stop() { farm_.stop(); }
 
  private:
-  Result<std::optional<JobDetail>> render_sweeps(const JobSpec& job, bool restart,
-                                                 class FrameSheet& sheet,
-                                                 const std::function<bool()>& interrupted);
-  Result<std::optional<JobDetail>> follow(const Digest& job, class FrameSheet& sheet,
-                                          const std::function<bool()>& interrupted);
+  Result<std::optional<ShownJob>> render_sweeps(const JobSpec& job, bool restart,
+                                                class FrameSheet& sheet,
+                                                const std::function<bool()>& interrupted);
+  Result<std::optional<ShownJob>> follow(const JobId& job, class FrameSheet& sheet,
+                                         const std::function<bool()>& interrupted);
   Status write_png_of(const JobSpec& job) const;
 
   const RenderOptions& options_;

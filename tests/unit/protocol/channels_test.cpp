@@ -38,11 +38,11 @@ TEST_F(ChannelTest, RouterPicksAPort) {
 TEST_F(ChannelTest, ARequestIsAnswered) {
   RequestClient client = RequestClient::connect(router.endpoint()).value();
   const std::jthread server = answer_once([](const Incoming& incoming) -> Message {
-    return JobAccepted{digest_of(std::get<SubmitJob>(*incoming.message).json), false};
+    return JobAccepted{{}, digest_of(std::get<SubmitJob>(*incoming.message).json), false};
   });
   const Result<Message> answer = client.request(SubmitJob{"{}"}, kPatience);
   ASSERT_TRUE(answer.ok());
-  EXPECT_EQ(std::get<JobAccepted>(*answer).job, digest_of("{}"));
+  EXPECT_EQ(std::get<JobAccepted>(*answer).version, digest_of("{}"));
 }
 
 TEST_F(ChannelTest, ARefusalIsAnError) {
@@ -72,10 +72,10 @@ TEST_F(ChannelTest, SilenceIsATimeoutAndALateAnswerIsNotMistaken) {
   const std::optional<Incoming> late = router.receive(kPatience);
   ASSERT_TRUE(late.has_value());
   router.send(late->peer, JobList{});
-  const std::jthread server = answer_once([](const Incoming&) -> Message { return JobDetail{}; });
+  const std::jthread server = answer_once([](const Incoming&) -> Message { return ShownJob{}; });
   const Result<Message> answer = client.request(ShowJob{"ab"}, kPatience);
   ASSERT_TRUE(answer.ok()) << answer.error().message;
-  EXPECT_TRUE(std::holds_alternative<JobDetail>(*answer));
+  EXPECT_TRUE(std::holds_alternative<ShownJob>(*answer));
 }
 
 TEST(RequestClientAlone, NobodyThereIsSaidSo) {

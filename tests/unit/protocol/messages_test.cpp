@@ -50,6 +50,9 @@ const JobSummary kSummary{
     {1, 2}, "name", "owner", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6, 7, 8,
     9,      10,     11,      kStats};
 
+const JobIdentity kIdentity{{9}, 2, {10, 11, 12}};
+const TaskPlace kPlace{TaskKind::second_pass, FrameNumber(3), FrameNumber(4), 5, 6};
+
 /// One of each, in the order of the type codes, no member left at its default.
 const std::vector<Message>& examples() {
   static const std::vector<Message> messages{
@@ -72,9 +75,10 @@ const std::vector<Message>& examples() {
       ShowJob{"abc"},
       CancelJob{"def"},
       StopCoordinator{},
-      JobAccepted{{5, 6}, true, "all is kept"},
-      JobList{{kSummary}, {{"w", "h", 1, 2, 3}}, 4, 5, 6.5},
-      JobDetail{kSummary,
+      JobAccepted{kIdentity, {5, 6}, true, "all is kept"},
+      JobList{{{kIdentity, kSummary}}, {{"w", "h", 1, 2, {{{9}, kPlace, 1.5}}, true}}, 4, 5, 6.5},
+      ShownJob{kIdentity,
+               {kSummary,
                 {FrameNumber(1), FrameNumber(2), FrameNumber(3)},
                 {"one", ""},
                 {{FrameNumber(3), -1, kStats.sampling}},
@@ -82,6 +86,7 @@ const std::vector<Message>& examples() {
                 "on",
                 false,
                 {"odd"}},
+               true},
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
@@ -93,6 +98,8 @@ const std::vector<Message>& examples() {
       StatesPublished{{1, 2}, {{kBlob, kBlob}}},
       RequestStates{{3, 4}, {{5, 6}}},
       BlobsLeft{kLease, {{5, 6}}},
+      ListEvents{"abc", {{9}, 3, 4, 5, false}},
+      EventList{{{1, 2, FarmEventKind::task_lost, "a", {9}, true, kPlace, "w", "gone", 2.5}}},
   };
   return messages;
 }
@@ -116,13 +123,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 11);
+  static_assert(kProtocolVersion == 12);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "1ae86f8148b44aa073a713a320ec4eb2");
+  EXPECT_EQ(digest_of(all).hex(), "56fb8a0b032fa3ab120551233cba5adc");
 }
 
 TEST(Messages, MembersArriveWhereTheyWereSent) {
@@ -135,7 +142,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0B\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0C\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -175,12 +182,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{12};
+  frames[0][5] = std::byte{13};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 12, this program speaks 11"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 13, this program speaks 12"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

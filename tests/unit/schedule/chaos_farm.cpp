@@ -169,6 +169,7 @@ void ChaosFarm::report(const std::string& worker) {
 void ChaosFarm::on(const GrantLease& a) {
   EXPECT_FALSE(recorded_.contains(a.lease.task)) << "granted after it was done";
   EXPECT_TRUE(issued_.insert(a.lease).second) << "a lease id is used once";
+  granted_.insert(a.lease);
   for (const TaskIndex input : graph_.inputs(a.lease.task)) {
     EXPECT_TRUE(recorded_.contains(graph_.key(input))) << "granted before its input was recorded";
   }

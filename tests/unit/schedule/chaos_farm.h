@@ -92,6 +92,7 @@ class ChaosFarm {
   void start_coordinator() {
     scheduler_ = std::make_unique<Scheduler>(++epoch_, kSilence, options_.store_limit);
     known_.clear();
+    granted_.clear();
     unreported_.merge(told_);
     told_.clear();
     add_job();
@@ -307,6 +308,7 @@ class ChaosFarm {
     for (const Action& action : scheduler_->step(event, now_)) {
       std::visit([this](const auto& a) { on(a); }, action);
     }
+    check_grants();
     most_bytes_ = std::max(most_bytes_, scheduler_->store_bytes());
     if (std::exchange(inspects_, false)) inspect();
   }
@@ -349,8 +351,19 @@ class ChaosFarm {
   void check_own_loss(const RecordReopened& a) const;
   void on(const RecordFailure& a) { failures_.push_back(a.failure); }
   void on(const RecordJobStatus&) {}
+  void on(const RecordRenderer&) {}
   void on(const InspectFrames&) { inspects_ = true; }
   void on(const GrantLease& a);
+  void on(const TellLeaseEnd& a) { granted_.erase(a.lease); }
+  /// Every grant of this coordinator has an end that was told, unless somebody has it.
+  void check_grants() const {
+    std::set<LeaseId> leased;
+    for (const std::string& worker : scheduler_->leases().connected()) {
+      for (const LeaseBook::Place& place : scheduler_->leases().of_worker(worker))
+        leased.insert(scheduler_->leases().at(place).id);
+    }
+    EXPECT_TRUE(std::ranges::includes(leased, granted_)) << "a lease ended, and nobody was told";
+  }
   void on(const RevokeLease& a) {
     if (const auto held = held_[a.worker].find(a.lease); held != held_[a.worker].end()) {
       tell_left(a.worker, a.lease, held->second);
@@ -391,7 +404,8 @@ class ChaosFarm {
   std::string reporter_;                             ///< of the last report
   std::map<TaskKey, std::set<std::string>> makers_;  ///< whose reports were recorded
   std::set<LeaseId> issued_;
-  std::set<Digest> store_;                                 ///< the blobs that are there
+  std::set<LeaseId> granted_;  ///< by this coordinator, without an end so far
+  std::set<Digest> store_;     ///< the blobs that are there
   std::vector<std::pair<std::string, AttemptLeft>> left_;  ///< still to be said
   std::set<Digest> told_;                                  ///< of, to this coordinator
   /// Published for leases of which nobody will report.

@@ -185,8 +185,11 @@ struct ServiceTest : testing::Test {
     EXPECT_FALSE(answer.ok());
     return answer.ok() ? Error{} : answer.error();
   }
+  JobIdentity show_identity(const std::string& endpoint, const std::string& text) {
+    return ask<ShownJob>(endpoint, ShowJob{text}).identity;
+  }
   JobDetail show(const std::string& endpoint, const Digest& id) {
-    return ask<JobDetail>(endpoint, ShowJob{id.hex()});
+    return ask<ShownJob>(endpoint, ShowJob{id.hex()}).detail;
   }
   /// Once the frames of a job whose tasks are done have been looked at.
   JobDetail show_after(JobStatus status, const std::string& endpoint, const Digest& id) {

@@ -28,8 +28,9 @@ TEST_F(ServiceTest, HundredsOfJobsThatHaveEndedAreInTheArchiveAlone) {
       JobSpec one = job;
       one.name = "job " + std::to_string(i);
       one.output.directory = (folder / one.name).string();
-      last = ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(one).value()}).job;
-      EXPECT_EQ(ask<JobDetail>(service.endpoint(), CancelJob{last.hex()}).summary.status,
+      last =
+          ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(one).value()}).version;
+      EXPECT_EQ(ask<ShownJob>(service.endpoint(), CancelJob{last.hex()}).detail.summary.status,
                 JobStatus::cancelled);
     }
   }
@@ -39,8 +40,8 @@ TEST_F(ServiceTest, HundredsOfJobsThatHaveEndedAreInTheArchiveAlone) {
   EXPECT_EQ(open.num_ended, kJobs);
   const auto all = ask<JobList>(service.endpoint(), ListJobs{.all = true});
   ASSERT_THAT(all.jobs, SizeIs(kJobs));
-  EXPECT_EQ(all.jobs.back().job, last);
-  const JobDetail detail = ask<JobDetail>(service.endpoint(), ShowJob{"job 77"});
+  EXPECT_EQ(all.jobs.back().summary.version, last);
+  const JobDetail detail = ask<ShownJob>(service.endpoint(), ShowJob{"job 77"}).detail;
   EXPECT_EQ(detail.summary.name, "job 77");
   EXPECT_EQ(detail.summary.status, JobStatus::cancelled);
   EXPECT_EQ(detail.summary.tasks_total, static_cast<std::uint64_t>(kNumTasks));
@@ -49,7 +50,7 @@ TEST_F(ServiceTest, HundredsOfJobsThatHaveEndedAreInTheArchiveAlone) {
   JobSpec one = job;
   one.name = "job 299";
   one.output.directory = (folder / one.name).string();
-  EXPECT_EQ(ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(one).value()}).job,
+  EXPECT_EQ(ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(one).value()}).version,
             last);
   EXPECT_THAT(ask<JobList>(service.endpoint(), ListJobs{}).jobs, SizeIs(1));
   ask<JobList>(service.endpoint(), DeleteJob{"job 77"});
@@ -63,7 +64,7 @@ TEST_F(ServiceTest, ADoneJobShowsWhatItDidAndKeepsItsStates) {
   Digest id;
   {
     const RunningService service(options);
-    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
     FakeWorker worker(service.endpoint(), store(), job);
     worker.hello();
     for (const char* note : {"a.exr: black", "a.exr: black", "b.exr: black"}) {
@@ -96,7 +97,7 @@ TEST_F(ServiceTest, ADoneJobShowsWhatItDidAndKeepsItsStates) {
 
 TEST_F(ServiceTest, MoreFramesGoOnFromTheStatesOfADoneJob) {
   const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   {
     FakeWorker worker(service.endpoint(), store(), job);
     worker.hello();
@@ -125,7 +126,7 @@ TEST_F(ServiceTest, MoreFramesGoOnFromTheStatesOfADoneJob) {
   worker.say(LeaseRequest{0});
   worker.say(Heartbeat{});
   worker.expect<Heartbeat>();
-  const JobDetail detail = show_end(service.endpoint(), accepted.job);
+  const JobDetail detail = show_end(service.endpoint(), accepted.version);
   EXPECT_EQ(detail.summary.status, JobStatus::done);
   EXPECT_EQ(detail.summary.stats.pixels, static_cast<std::uint64_t>(kNumTasks + 4))
       << "what the first job counted is its own, too";

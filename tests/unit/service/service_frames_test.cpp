@@ -50,7 +50,7 @@ struct FramesTest : ServiceTest {
 
   /// Submits the job, has its folder marked, and does all but its last task.
   Digest begin(const std::string& endpoint, FakeWorker& worker) {
-    const Digest id = ask<JobAccepted>(endpoint, SubmitJob{document}).job;
+    const Digest id = ask<JobAccepted>(endpoint, SubmitJob{document}).version;
     worker.hello();
     worker.say(JobDocumentRequest{id});
     EXPECT_FALSE(worker.expect<JobDocument>().token.empty());
@@ -129,7 +129,7 @@ TEST_F(FramesTest, ThePictureOfSomebodyElseIsKeptAndTheJobFails) {
   put(2, std::string(kPicture));
   JobDetail detail = finish(service.endpoint(), worker, id);
   EXPECT_EQ(detail.summary.status, JobStatus::failed);
-  EXPECT_THAT(detail.waits, HasSubstr("frame.0002.exr is not what was written"));
+  EXPECT_THAT(detail.waits, HasSubstr("frame.0002.exr is not what a job has written"));
   EXPECT_THAT(detail.waits, HasSubstr("--restart"));
   EXPECT_EQ(read_text_file(frame(2), 100).value(), kPicture);
 
@@ -139,10 +139,10 @@ TEST_F(FramesTest, ThePictureOfSomebodyElseIsKeptAndTheJobFails) {
   for (const std::string& again : {document, make_job_document(urgent).value()}) {
     const Error refusal = refused(service.endpoint(), SubmitJob{again});
     EXPECT_EQ(refusal.kind, ErrorKind::io);
-    EXPECT_THAT(refusal.message, HasSubstr("frame.0002.exr is not what was written"));
+    EXPECT_THAT(refusal.message, HasSubstr("frame.0002.exr is not what a job has written"));
   }
   EXPECT_EQ(read_text_file(frame(2), 100).value(), kPicture);
-  EXPECT_EQ(ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).job, id);
+  EXPECT_EQ(ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).version, id);
   detail = finish(service.endpoint(), worker, id);
   EXPECT_EQ(detail.summary.status, JobStatus::done);
   EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
@@ -154,7 +154,7 @@ TEST_F(FramesTest, ThePictureOfAFormerJobOfTheFolderIsMadeAgain) {
   JobSpec urgent = job;
   urgent.priority = 7;
   const Digest former =
-      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).job;
+      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   const Digest id = begin(service.endpoint(), worker);
   put(2, std::string(kPicture) + former.hex());
@@ -185,7 +185,7 @@ TEST_F(FramesTest, AFolderThatLostItsMarkIsNotTheFolder) {
   fs::remove_all(out);
   EXPECT_THAT(refused(service.endpoint(), ResumeJob{id.hex()}).message, HasSubstr("is not there"));
   fs::rename(away, out);
-  EXPECT_EQ(ask<JobDetail>(service.endpoint(), ResumeJob{id.hex()}).summary.status,
+  EXPECT_EQ(ask<ShownJob>(service.endpoint(), ResumeJob{id.hex()}).detail.summary.status,
             JobStatus::running);
   EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
   for (int number = 1; number <= 4; ++number) EXPECT_TRUE(fs::exists(frame(number)));
@@ -198,7 +198,7 @@ TEST_F(FramesTest, OnlyAFolderWithAllFramesIsMarkedAgain) {
   const Digest id = begin(service.endpoint(), worker);
   fs::remove(mark(id));
   EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::paused);
-  EXPECT_EQ(ask<JobDetail>(service.endpoint(), ResumeJob{id.hex()}).summary.status,
+  EXPECT_EQ(ask<ShownJob>(service.endpoint(), ResumeJob{id.hex()}).detail.summary.status,
             JobStatus::running);
   EXPECT_TRUE(fs::exists(mark(id)));
   fs::remove(mark(id));
@@ -214,7 +214,7 @@ TEST_F(FramesTest, OnlyAFolderWithAllFramesIsMarkedAgain) {
 TEST_F(FramesTest, AFileThatIsLateIsWaitedFor) {
   options.file_patience = kPatience;
   const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   for (int i = 0; i < 3; ++i) {
@@ -243,6 +243,7 @@ TEST_F(FramesTest, AFrameThatCannotBeReadIsWaitedForThenPausesTheJob) {
   for (const bool passes : {true, false}) {
     options.file_patience = passes ? std::chrono::milliseconds(kPatience) : 1500ms;
     options.work_dir = folder / (passes ? "passes" : "stays");
+    fs::remove_all(job.output.directory);
     const RunningService service(options);
     FakeWorker worker(service.endpoint(), store(), job);
     broken = "frame.0002.exr";
@@ -293,7 +294,7 @@ TEST_F(FramesTest, AThousandFramesThatStandAsReportedAreNotRead) {
   document = make_job_document(job).value();
   const RunningService service(options);
   FakeWorker worker(service.endpoint(), store(), job);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   worker.hello();
   constexpr int kAtOnce = 50;
   const std::uint64_t num_tasks = show(service.endpoint(), id).summary.tasks_total;
@@ -310,10 +311,10 @@ TEST_F(FramesTest, AThousandFramesThatStandAsReportedAreNotRead) {
 // Workers that have its document from before do not ask again, and render nothing without a mark.
 TEST_F(FramesTest, AnOpenJobHasItsMarkBeforeAnybodyAsksForItsDocument) {
   const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   const fs::path mark = output_token_file(job.output.directory, id);
   EXPECT_TRUE(fs::exists(mark));
-  ask<JobDetail>(service.endpoint(), CancelJob{id.hex()});
+  ask<ShownJob>(service.endpoint(), CancelJob{id.hex()}).detail;
   fs::remove_all(job.output.directory);
   ask<JobAccepted>(service.endpoint(), SubmitJob{document});
   EXPECT_TRUE(fs::exists(mark));

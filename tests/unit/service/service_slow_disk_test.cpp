@@ -64,7 +64,7 @@ struct SlowDiskTest : ServiceTest {
   }
   /// Submits the job and does all of it, or but for some tasks. Its frames must be read then.
   Digest do_job(const std::string& endpoint, FakeWorker& worker, int num_open = 0) {
-    const Digest id = ask<JobAccepted>(endpoint, SubmitJob{document}).job;
+    const Digest id = ask<JobAccepted>(endpoint, SubmitJob{document}).version;
     worker.hello();
     for (int i = 0; i < kNumTasks - num_open; ++i) worker.do_one_task();
     sync(worker);
@@ -172,21 +172,21 @@ TEST_F(SlowDiskTest, NobodyWaitsForTheFramesOfAPausedJob) {
   const RunningService service(options);
   FakeWorker worker(service.endpoint(), store(), job);
   const Digest id = do_job(service.endpoint(), worker, 1);
-  ask<JobDetail>(service.endpoint(), PauseJob{id.hex()});
+  ask<ShownJob>(service.endpoint(), PauseJob{id.hex()}).detail;
   std::optional<Slow> slow(disk);
   EXPECT_EQ(refused(service.endpoint(), ResumeJob{id.hex()}).kind, ErrorKind::timeout);
   EXPECT_EQ(refused(service.endpoint(), SubmitJob{document}).kind, ErrorKind::timeout);
   expect_alive(worker);
   EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::paused);
   slow.reset();
-  EXPECT_EQ(ask_until_done<JobDetail>(service.endpoint(), ResumeJob{id.hex()}).summary.status,
-            JobStatus::running);
+  const auto resumed = ask_until_done<ShownJob>(service.endpoint(), ResumeJob{id.hex()});
+  EXPECT_EQ(resumed.detail.summary.status, JobStatus::running);
 }
 
 // A report that waits is not confirmed; said twice, it is one failure.
 TEST_F(SlowDiskTest, NobodyWaitsForTheInputsOfAFailedAttempt) {
   const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   for (int i = 0; i < 2; ++i) worker.do_one_task();

@@ -36,7 +36,7 @@ TEST_F(ServiceStoreTest, AStartRemovesWhatNoJobNeedsAndNothingElse) {
   Digest id;
   {
     const RunningService service(options);
-    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
     do_tasks(service.endpoint(), 2);
   }
   const fs::path orphan = put_leftover("of a worker that was killed");
@@ -109,13 +109,13 @@ TEST_F(ServiceStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
   other.output.directory = (folder / "other").string();
   options.store_limit = 45;
   const RunningService service(options);
-  const Digest first = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest first = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   for (int i = 0; i < 2; ++i) worker.do_one_task();
-  ask<JobDetail>(service.endpoint(), CancelJob{first.hex()});
+  ask<ShownJob>(service.endpoint(), CancelJob{first.hex()}).detail;
   const Digest second =
-      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(other).value()}).job;
+      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(other).value()}).version;
   worker.do_one_task();
   const JobDetail waiting = show(service.endpoint(), second);
   EXPECT_EQ(waiting.summary.status, JobStatus::running);

@@ -26,7 +26,7 @@ std::size_t count_blobs(const fs::path& store) {
 TEST_F(ServiceTest, AJobGoesFromSubmissionToItsLastFrame) {
   const RunningService service(options);
   const auto accepted = ask<JobAccepted>(service.endpoint(), SubmitJob{document});
-  EXPECT_EQ(accepted.job, digest_of(document));
+  EXPECT_EQ(accepted.version, digest_of(document));
   EXPECT_FALSE(accepted.already_there);
   EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
 
@@ -36,13 +36,13 @@ TEST_F(ServiceTest, AJobGoesFromSubmissionToItsLastFrame) {
   EXPECT_EQ(welcome.epoch, 1u);
   EXPECT_EQ(welcome.heartbeat_ms, kHeartbeat.count());
   EXPECT_TRUE(fs::equivalent(welcome.store_directory, store()));
-  worker.say(JobDocumentRequest{accepted.job});
+  worker.say(JobDocumentRequest{accepted.version});
   EXPECT_EQ(worker.expect<JobDocument>().json, document);
   for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
   worker.say(LeaseRequest{1});
   worker.expect<NoWork>();
 
-  const JobDetail detail = show_end(service.endpoint(), accepted.job);
+  const JobDetail detail = show_end(service.endpoint(), accepted.version);
   EXPECT_EQ(detail.summary.status, JobStatus::done);
   EXPECT_EQ(detail.summary.tasks_done, 8u);
   EXPECT_EQ(detail.summary.stats.pixels, 8u);
@@ -62,7 +62,7 @@ TEST_F(ServiceTest, AJobGoesFromSubmissionToItsLastFrame) {
 
   const auto list = ask<JobList>(service.endpoint(), ListJobs{.all = true});
   ASSERT_THAT(list.jobs, SizeIs(1));
-  EXPECT_EQ(list.jobs[0].name, "test");
+  EXPECT_EQ(list.jobs[0].summary.name, "test");
   ASSERT_THAT(list.workers, SizeIs(1));
   EXPECT_EQ(list.workers[0].num_threads, 2);
 }
@@ -72,7 +72,7 @@ TEST_F(ServiceTest, ARestartedCoordinatorGoesOnWithWhatItsWorkersHold) {
   Digest id;
   {
     const RunningService service(options);
-    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
     FakeWorker worker(service.endpoint(), store(), job);
     worker.hello();
     for (int i = 0; i < 3; ++i) worker.do_one_task();
@@ -118,7 +118,7 @@ TEST_F(ServiceTest, ASilentWorkerIsForgottenAndItsTaskGoesOn) {
 TEST_F(ServiceTest, ASecondHelloOfAProcessLosesNoLease) {
   options.heartbeat = std::chrono::minutes(1);
   const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   worker.say(LeaseRequest{1});
@@ -143,7 +143,7 @@ TEST_F(ServiceTest, HeartbeatsAreAnswered) {
 
 TEST_F(ServiceTest, AFailureIsToldWithItsPlace) {
   const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   worker.say(LeaseRequest{2});
@@ -158,7 +158,7 @@ TEST_F(ServiceTest, AFailureIsToldWithItsPlace) {
 
 TEST_F(ServiceTest, AReportWithoutItsBlobsGivesTheTaskBackWithoutBlame) {
   const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   worker.say(LeaseRequest{1});
@@ -174,13 +174,13 @@ TEST_F(ServiceTest, AReportWithoutItsBlobsGivesTheTaskBackWithoutBlame) {
 
 TEST_F(ServiceTest, ACancelledJobGoesOnWhenItIsSubmittedAgain) {
   const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   worker.do_one_task();
   worker.say(LeaseRequest{1});
   const LeaseId held = worker.expect<LeaseGrant>().lease;
-  EXPECT_EQ(ask<JobDetail>(service.endpoint(), CancelJob{id.short_hex()}).summary.status,
+  EXPECT_EQ(ask<ShownJob>(service.endpoint(), CancelJob{id.short_hex()}).detail.summary.status,
             JobStatus::cancelled);
   EXPECT_EQ(worker.expect<LeaseRevoke>().lease, held);
 
@@ -196,7 +196,7 @@ TEST_F(ServiceTest, ADeletedJobLeavesNeitherStatesNorALineOfTheJournal) {
   Digest id;
   {
     const RunningService service(options);
-    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
     FakeWorker worker(service.endpoint(), store(), job);
     worker.hello();
     EXPECT_THAT(refused(service.endpoint(), DeleteJob{id.hex()}).message,
@@ -218,8 +218,8 @@ TEST_F(ServiceTest, APausedJobIsPausedAfterARestartAndResumedBySubmission) {
   Digest id;
   {
     const RunningService service(options);
-    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
-    EXPECT_EQ(ask<JobDetail>(service.endpoint(), PauseJob{id.hex()}).summary.status,
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+    EXPECT_EQ(ask<ShownJob>(service.endpoint(), PauseJob{id.hex()}).detail.summary.status,
               JobStatus::paused);
   }
   const RunningService service(options);
@@ -227,10 +227,10 @@ TEST_F(ServiceTest, APausedJobIsPausedAfterARestartAndResumedBySubmission) {
   worker.hello();
   worker.say(LeaseRequest{1});
   worker.expect<NoWork>();
-  EXPECT_EQ(ask<JobDetail>(service.endpoint(), ResumeJob{id.hex()}).summary.status,
+  EXPECT_EQ(ask<ShownJob>(service.endpoint(), ResumeJob{id.hex()}).detail.summary.status,
             JobStatus::running);
   worker.expect<LeaseGrant>();
-  EXPECT_EQ(ask<JobDetail>(service.endpoint(), PauseJob{id.hex()}).summary.status,
+  EXPECT_EQ(ask<ShownJob>(service.endpoint(), PauseJob{id.hex()}).detail.summary.status,
             JobStatus::paused);
   EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
   EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::running);
@@ -269,8 +269,8 @@ TEST_F(ServiceTest, TwoWorkersOfOneNameWorkSideBySide) {
   ASSERT_THAT(list.workers, SizeIs(2));
   EXPECT_EQ(list.workers[0].worker_id, "w");
   EXPECT_EQ(list.workers[1].worker_id, "w#00000002");
-  for (const WorkerSummary& worker : list.workers) EXPECT_EQ(worker.leases, 1);
-  EXPECT_EQ(show(service.endpoint(), accepted.job).summary.attempts_lost, 0u);
+  for (const WorkerSummary& worker : list.workers) EXPECT_EQ(worker.tasks.size(), 1u);
+  EXPECT_EQ(show(service.endpoint(), accepted.version).summary.attempts_lost, 0u);
 }
 
 TEST_F(ServiceTest, AWorkerOfAnotherBuildIsRefusedUnlessBuildsMayMix) {

@@ -1,0 +1,149 @@
+#include "coordinator/service/history.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <utility>
+
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+std::int64_t now_ms() {
+  using namespace std::chrono;
+  return duration_cast<milliseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+double seconds_since(TimePoint time) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - time).count();
+}
+
+FarmEventKind kind_of(JobStatus status) {
+  constexpr std::array kKinds{FarmEventKind::job_resumed, FarmEventKind::job_done,
+                              FarmEventKind::job_failed, FarmEventKind::job_cancelled,
+                              FarmEventKind::job_paused};
+  return kKinds.at(static_cast<std::size_t>(status));
+}
+
+FarmEventKind kind_of(LeaseEnd end) {
+  constexpr std::array kKinds{FarmEventKind::task_done, FarmEventKind::task_failed,
+                              FarmEventKind::task_returned, FarmEventKind::task_lost,
+                              FarmEventKind::task_revoked};
+  return kKinds.at(static_cast<std::size_t>(end));
+}
+
+}  // namespace
+
+TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt) {
+  const Timeline& timeline = job.tasks.graph().timeline();
+  const auto number = [&](FrameIndex frame) { return job.spec.frames[frame.index()]; };
+  TaskPlace place{.kind = task.kind, .tile = task.tile, .attempt = attempt};
+  switch (task.kind) {
+    case TaskKind::assemble:
+      place.first = place.last = number(task.frame());
+      break;
+    case TaskKind::second_pass:
+      place.first = place.last = number(timeline.frame_of(task.step()));
+      break;
+    case TaskKind::render:
+      const StepSpan steps = timeline.steps_of(task.run());
+      place.first = number(timeline.frame_of(steps.first));
+      place.last = number(timeline.frame_of(steps.last));
+      break;
+  }
+  return place;
+}
+
+Status History::read() {
+  BATON_ASSIGN(jobs_, IdentityBook::read(journal_));
+  return {};
+}
+
+std::string History::name_of(const Digest& version) const {
+  const JobId id = jobs_.of(version).id;
+  return id.empty() ? version.short_hex() : id.short_hex();
+}
+
+Status History::tell(FarmEvent event) {
+  event.time_ms = now_ms();
+  event.actor = actor_;
+  event.reason.resize(std::min<std::size_t>(event.reason.size(), limits::kMaxTextLength));
+  return journal_.record_event(event);
+}
+
+Status History::submitted(const Digest& document, const JobId& job, const std::string& reason) {
+  const bool is_changed = !jobs_.is_newest(document) && !jobs_.versions(job).empty();
+  if (!jobs_.is_newest(document)) BATON_TRY(jobs_.add_version(journal_, document, job));
+  JobTimes times = jobs_.of(document).times;
+  if (times.submitted_ms == 0) times.submitted_ms = now_ms();
+  times.ended_ms = 0;
+  BATON_TRY(jobs_.set_times(journal_, job, times));
+  return tell({.kind = is_changed ? FarmEventKind::job_changed : FarmEventKind::job_submitted,
+               .job = job,
+               .reason = reason});
+}
+
+Status History::status_changed(const Digest& version, JobStatus status, const std::string& reason) {
+  // A version that has made way for another is not the end of the job.
+  if (!jobs_.is_newest(version)) return {};
+  const JobIdentity job = jobs_.of(version);
+  JobTimes times = job.times;
+  times.ended_ms = is_open(status) ? 0 : now_ms();
+  BATON_TRY(jobs_.set_times(journal_, job.id, times));
+  const double seconds = times.ended_ms == 0 || times.started_ms == 0
+                             ? 0
+                             : static_cast<double>(times.ended_ms - times.started_ms) / 1000;
+  return tell({.kind = kind_of(status), .job = job.id, .reason = reason, .seconds = seconds});
+}
+
+Status History::deleted(const Digest& version) {
+  const JobId job = jobs_.of(version).id;
+  jobs_.forget(job);
+  return tell({.kind = FarmEventKind::job_deleted, .job = job});
+}
+
+Status History::granted(const Scheduler::Job& job, const LeaseId& lease,
+                        const std::string& worker) {
+  const JobIdentity who = jobs_.of(lease.job);
+  if (who.times.started_ms == 0) {
+    JobTimes times = who.times;
+    times.started_ms = now_ms();
+    BATON_TRY(jobs_.set_times(journal_, who.id, times));
+  }
+  return tell({.kind = FarmEventKind::task_granted,
+               .job = who.id,
+               .has_task = true,
+               .task = place_of(job, lease.task, lease.attempt),
+               .worker = worker});
+}
+
+Status History::lease_ended(const Scheduler::Job* job, const TellLeaseEnd& end) {
+  FarmEvent event{.kind = kind_of(end.end),
+                  .job = jobs_.of(end.lease.job).id,
+                  .worker = end.worker,
+                  .reason = end.reason,
+                  .seconds = seconds_since(end.granted_at)};
+  event.has_task = job != nullptr;
+  if (job != nullptr) event.task = place_of(*job, end.lease.task, end.lease.attempt);
+  return tell(std::move(event));
+}
+
+Status History::reopened(const RecordReopened& tasks) {
+  return tell({.kind = FarmEventKind::tasks_reopened,
+               .job = jobs_.of(tasks.job).id,
+               .reason = fmt::format("{} finished tasks are done again, since {} is gone",
+                                     tasks.tasks.size(), tasks.gone)});
+}
+
+Status History::happened(FarmEventKind kind, const std::string& worker, const std::string& reason) {
+  return tell({.kind = kind, .worker = worker, .reason = reason});
+}
+
+Status History::clean_up() {
+  const std::chrono::milliseconds age = limits::kMaxEventAge;
+  return journal_.forget_events(limits::kMaxEvents, now_ms() - age.count());
+}
+
+}  // namespace baton

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <string>
+
+#include "coordinator/journal/journal.h"
+#include "coordinator/schedule/scheduler.h"
+#include "coordinator/service/identity_book.h"
+
+namespace baton {
+
+/// A task of a job as people see it.
+TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt = 0);
+
+/// Tells the journal what happens, once, in the transaction of what it tells. Jobs are named by the
+/// digest of a version; one that is a version of no job is told of without a name.
+class History {
+ public:
+  /// journal: outlives the history.
+  explicit History(Journal& journal) : journal_(journal) {}
+  /// Takes up who the journal's jobs are.
+  Status read();
+
+  /// Who does what is told from now on: a key's name, or a worker's; empty: the coordinator itself,
+  /// or somebody without a key.
+  void set_actor(std::string actor) { actor_ = std::move(actor); }
+  const IdentityBook& jobs() const { return jobs_; }
+  /// Short, for people: the ID of the job, or the beginning of the digest where it has none.
+  std::string name_of(const Digest& version) const;
+
+  /// The document is the job's newest version, and runs, from now on.
+  Status submitted(const Digest& document, const JobId& job, const std::string& reason);
+  Status status_changed(const Digest& version, JobStatus status, const std::string& reason);
+  Status deleted(const Digest& version);
+  Status granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker);
+  /// job: null: it is forgotten.
+  Status lease_ended(const Scheduler::Job* job, const TellLeaseEnd& end);
+  Status reopened(const RecordReopened& tasks);
+  /// Of the coordinator or a worker.
+  Status happened(FarmEventKind kind, const std::string& worker = {},
+                  const std::string& reason = {});
+  /// Forgets what is old.
+  Status clean_up();
+
+ private:
+  Status tell(FarmEvent event);
+
+  Journal& journal_;
+  IdentityBook jobs_;
+  std::string actor_;
+};
+
+}  // namespace baton

@@ -1,0 +1,64 @@
+#include "coordinator/service/identity_book.h"
+
+namespace baton {
+
+Result<IdentityBook> IdentityBook::read(Journal& journal) {
+  IdentityBook book;
+  BATON_ASSIGN(const std::vector<JobVersion> versions, journal.versions());
+  for (const JobVersion& version : versions) {
+    book.documents_[version.document] = version;
+    book.jobs_[version.id].versions[version.number] = version.document;
+  }
+  BATON_ASSIGN(const auto times, journal.times());
+  for (const auto& [id, of_job] : times) {
+    const auto job = book.jobs_.find(id);
+    if (job != book.jobs_.end()) job->second.times = of_job;
+  }
+  return book;
+}
+
+JobIdentity IdentityBook::of(const Digest& document) const {
+  const auto version = documents_.find(document);
+  if (version == documents_.end()) return {};
+  return {version->second.id, version->second.number, jobs_.at(version->second.id).times};
+}
+
+bool IdentityBook::is_newest(const Digest& document) const {
+  const auto version = documents_.find(document);
+  if (version == documents_.end()) return false;
+  return jobs_.at(version->second.id).versions.rbegin()->second == document;
+}
+
+std::vector<Digest> IdentityBook::versions(const JobId& job) const {
+  std::vector<Digest> documents;
+  const auto found = jobs_.find(job);
+  if (found == jobs_.end()) return documents;
+  for (const auto& [number, document] : found->second.versions) documents.push_back(document);
+  return documents;
+}
+
+Status IdentityBook::add_version(Journal& journal, const Digest& document, const JobId& job) {
+  if (const auto before = documents_.find(document); before != documents_.end()) {
+    const auto former = jobs_.find(before->second.id);
+    former->second.versions.erase(before->second.number);
+    if (former->second.versions.empty() && former->first != job) jobs_.erase(former);
+  }
+  BATON_ASSIGN(const std::int32_t number, journal.record_version(document, job));
+  documents_[document] = {document, job, number};
+  jobs_[job].versions[number] = document;
+  return {};
+}
+
+Status IdentityBook::set_times(Journal& journal, const JobId& job, const JobTimes& times) {
+  const auto found = jobs_.find(job);
+  if (found == jobs_.end() || found->second.times == times) return {};
+  found->second.times = times;
+  return journal.record_times(job, times);
+}
+
+void IdentityBook::forget(const JobId& job) {
+  for (const Digest& document : versions(job)) documents_.erase(document);
+  jobs_.erase(job);
+}
+
+}  // namespace baton

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/job/job_id.h"
+#include "coordinator/journal/journal.h"
+
+namespace baton {
+
+/// Which document is a version of which job, and when what happened to that. What it learns it puts
+/// into the journal.
+class IdentityBook {
+ public:
+  static Result<IdentityBook> read(Journal& journal);
+
+  /// An empty ID: the document is no version of any job.
+  JobIdentity of(const Digest& document) const;
+  bool is_newest(const Digest& document) const;
+  /// Oldest first; none where the job is not known.
+  std::vector<Digest> versions(const JobId& job) const;
+  std::size_t num_jobs() const { return jobs_.size(); }
+
+  /// The document is the job's newest version from now on.
+  Status add_version(Journal& journal, const Digest& document, const JobId& job);
+  /// Replaces the times of a job that is known.
+  Status set_times(Journal& journal, const JobId& job, const JobTimes& times);
+  /// The job is forgotten here; the journal forgets it with its documents.
+  void forget(const JobId& job);
+
+ private:
+  struct Job {
+    JobTimes times;
+    std::map<std::int32_t, Digest> versions;
+  };
+  std::map<JobId, Job> jobs_;
+  std::map<Digest, JobVersion> documents_;
+};
+
+}  // namespace baton

@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <thread>
+
+#include "common/base/limits.h"
+#include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/farm/events_command.h"
+#include "jobs/cli/job_summary.h"
+#include "jobs/cli/text.h"
+
+namespace baton {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::chrono::milliseconds kFollowInterval{500};
+
+struct EventsOptions {
+  CoordinatorLink link;
+  std::string job;    ///< name, ID or its beginning; empty: of all
+  std::string since;  ///< empty: since ever
+  int count = 100;
+  bool follow = false, json = false;
+};
+
+ordered_json event_json(const FarmEvent& event) {
+  ordered_json row = {{"sequence", event.sequence},
+                      {"time", utc_iso(event.time_ms)},
+                      {"kind", farm_event_name(event.kind)}};
+  if (!event.actor.empty()) row["actor"] = event.actor;
+  if (!event.job.empty()) row["job"] = event.job.hex();
+  if (event.has_task) row.update(place_json(event.task));
+  if (!event.worker.empty()) row["worker"] = event.worker;
+  if (!event.reason.empty()) row["reason"] = event.reason;
+  if (event.seconds > 0) row["seconds"] = event.seconds;
+  return row;
+}
+
+std::string event_line(const FarmEvent& event) {
+  std::string text =
+      fmt::format("{}  {:<19}", utc_text(event.time_ms), farm_event_name(event.kind));
+  if (!event.job.empty()) text += fmt::format("  job {}", event.job.short_hex());
+  if (event.has_task) text += "  " + place_text(event.task);
+  if (event.has_task && event.task.attempt > 1)
+    text += fmt::format(", attempt {}", event.task.attempt);
+  if (!event.worker.empty()) text += "  " + event.worker;
+  if (event.seconds > 0) text += fmt::format("  after {:.1f} s", event.seconds);
+  if (!event.actor.empty() && event.actor != event.worker) text += "  by " + event.actor;
+  if (!event.reason.empty()) text += ": " + event.reason;
+  return text;
+}
+
+void print_events(const std::vector<FarmEvent>& events, bool json) {
+  for (const FarmEvent& event : events)
+    fmt::print("{}\n", json ? event_json(event).dump() : event_line(event));
+  std::fflush(stdout);
+}
+
+/// What has happened, and with --follow what happens until the coordinator ends.
+Result<ExitCode> show_events(const EventsOptions& options) {
+  BATON_ASSIGN(RequestClient client, options.link.connect());
+  ListEvents question{options.job, {.count = options.count}};
+  if (!options.since.empty()) {
+    BATON_ASSIGN(question.query.since_ms, parse_since(options.since, now_ms()));
+  }
+  BATON_ASSIGN(EventList found, ask<EventList>(client, question));
+  print_events(found.events, options.json);
+  question.query.is_newest = false;
+  question.query.count = limits::kMaxEventsTold;
+  while (options.follow) {
+    if (!found.events.empty()) question.query.after_sequence = found.events.back().sequence;
+    std::this_thread::sleep_for(kFollowInterval);
+    BATON_ASSIGN(found, ask<EventList>(client, question));
+    print_events(found.events, options.json);
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_events_command(CLI::App& farm, ExitCode& code) {
+  auto options = std::make_shared<EventsOptions>();
+  CLI::App* events = farm.add_subcommand(
+      "events", "What has happened: jobs, tasks, workers, with time, cause and duration");
+  add_coordinator_options(*events, options->link);
+  events->add_option("--job", options->job,
+                     "of this job alone: its name, its ID, or its beginning");
+  events->add_option("--since", options->since,
+                     "30s, 15m, 2h or 3d ago, or a time in UTC: 2026-11-28T13:20:46");
+  events->add_option("--last", options->count, "at most so many, the newest")
+      ->check(CLI::Range(1, limits::kMaxEventsTold))
+      ->capture_default_str();
+  events->add_flag("--follow", options->follow, "goes on with what happens");
+  events->add_flag("--json", options->json, "an object a line, for machines");
+  events->footer(
+      "Examples:\n"
+      "  baton farm events --since 2h --coordinator tcp://farm:5570\n"
+      "  baton farm events --job shot7 --follow");
+  events->callback([options, &code] { code = finish_with_coordinator(show_events(*options)); });
+}
+
+}  // namespace baton

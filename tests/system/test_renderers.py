@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+"""Machines that are not alike: frames of one job are by one instruction set, or it is said."""
+
+import time
+
+from farm import IO, OK, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
+from jobs import make_job, write_job
+
+FRAMES = 6
+
+
+def make(folder, **changes):
+    return write_job(folder / "job.json", make_job(folder, **{"frames": f"1-{FRAMES}", "image": {"tileSize": 32}, **changes}))
+
+
+def sets_of(programs):
+    """The instruction sets that workers of this machine and build have."""
+    found = []
+    for name in ("sse4", "avx2", "avx512"):
+        done = programs.run("baton-worker", "--isa", name, "--coordinator", "tcp://127.0.0.1:1", "--give-up-s", "1", expect=None)
+        if done.returncode != USAGE:
+            found.append(name)
+    return found
+
+
+def another_instruction_set_does_not_go_on(programs, folder):
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        print("one instruction set: nothing to see")
+        return
+    best, least = sets[-1], sets[0]
+    witness = folder / "witness"
+    programs.render(make(witness), witness / "work", extra=("--isa", least))
+    path = make(folder)
+    with Farm(programs, folder / "farm") as farm:
+        worker = farm.start_worker(extra=("--isa", best))
+        ident = farm.submit(path)
+        wait_until(lambda: farm.show(ident)["framesDone"] >= 2, "two frames are done")
+        worker.terminate()
+        worker.wait()
+        check(farm.show(ident)["framesDone"] < FRAMES, "all was done too soon")
+
+        # Nobody mixes them, not after a restart of the coordinator either.
+        farm.coordinator.kill()
+        farm.start_coordinator()
+        farm.start_worker(extra=("--isa", least))
+        shown = wait_until(lambda: (lambda s: s if s.get("waits") else None)(farm.show(ident)), "it waits")
+        check_says(shown["waits"], "a worker that renders as what is done was rendered", "--restart", "--from-frame", "--isa")
+        done = shown["framesDone"]
+        time.sleep(0.5)
+        check_equal(farm.show(ident)["framesDone"], done, "frames that another instruction set made")
+
+        # All again with the other one.
+        farm.baton("job", "submit", path, "--restart")
+        farm.wait_for(ident)
+    check_equal(programs.pixels(folder / "frames"), programs.pixels(witness / "frames"), "pixels")
+
+
+def the_one_command_says_so(programs, folder):
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    path = make(folder, sampling={"numCandidates": 512, "numDistributions": 48})
+    command = ["render", str(path), "--threads-per-worker", "1", "--work-dir", str(folder / "work"), "--isa"]
+    running = Process([programs.path("baton"), *command, sets[-1]], folder / "render.log")
+    wait_until((folder / "frames/frame.0001.exr").exists, "the first frame is written")
+    time.sleep(0.3)
+    running.terminate()
+    running.wait()
+    check(not (folder / f"frames/frame.{FRAMES:04d}.exr").exists(), "all was done too soon")
+    done = programs.run("baton", *command, sets[0], expect=None)
+    check(done.returncode not in (OK, IO), f"exit code {done.returncode}")
+    check_says(done.stderr, "renders as what is done was rendered", "--restart")
+    programs.run("baton", *command, sets[-1])
+
+
+def a_set_that_is_not_there_is_said(programs, folder):
+    done = programs.run("baton-worker", "--isa", "avx1024", "--coordinator", "tcp://127.0.0.1:1", expect=USAGE)
+    check_says(done.stderr + done.stdout, "--isa avx1024: expected auto, sse4, avx2 or avx512")
+
+
+if __name__ == "__main__":
+    run_tests()
