@@ -11,7 +11,6 @@
 #include <thread>
 
 #include "common/base/log.h"
-#include "common/math/instruction_set.h"
 #include "worker/run/crash_handler.h"
 #include "worker/run/replay.h"
 #include "worker/run/worker.h"
@@ -80,6 +79,20 @@ baton::Status take_pilot_options(const PilotOptions& pilot, baton::WorkerOptions
   return {};
 }
 
+CLI::App* add_replay_command(CLI::App& app, baton::ReplayOptions& options,
+                             std::vector<int>& pixel) {
+  CLI::App* const command =
+      app.add_subcommand("replay", "Renders one tile in this process, without a farm");
+  command->add_option("JOB", options.job, "job file")->required();
+  command->add_option("--frame", options.frame_number, "frame number")->required();
+  command->add_option("--tile", options.tile, "tile, 0-based, row by row")->required();
+  command->add_option("--pixel", pixel, "x,y in the image: prints its channels and particles")
+      ->delimiter(',')
+      ->expected(2);
+  command->add_option("--out", options.out, "EXR of the tile; default: tile<T>.frame<F>.exr");
+  return command;
+}
+
 int replay(const baton::ReplayOptions& options) {
   const baton::Result<std::string> report = baton::replay_tile(options);
   if (report) {
@@ -134,18 +147,7 @@ int main(int argc, char** argv) {
 
   baton::ReplayOptions replay_options;
   std::vector<int> pixel;
-  CLI::App* const replay_command =
-      app.add_subcommand("replay", "Renders one tile in this process, without a farm");
-  replay_command->add_option("JOB", replay_options.job, "job file")->required();
-  replay_command->add_option("--frame", replay_options.frame_number, "frame number")->required();
-  replay_command->add_option("--tile", replay_options.tile, "tile, 0-based, row by row")
-      ->required();
-  replay_command
-      ->add_option("--pixel", pixel, "x,y in the image: prints its channels and particles")
-      ->delimiter(',')
-      ->expected(2);
-  replay_command->add_option("--out", replay_options.out,
-                             "EXR of the tile; default: tile<T>.frame<F>.exr");
+  CLI::App* const replay_command = add_replay_command(app, replay_options, pixel);
 
   try {
     app.parse(argc, argv);
@@ -157,7 +159,7 @@ int main(int argc, char** argv) {
 
   baton::init_logging("baton-worker");
   baton::install_crash_handler();
-  if (const baton::Status limited = baton::limit_instruction_set(isa); !limited) {
+  if (const baton::Status limited = baton::use_instruction_set(isa); !limited) {
     spdlog::error("{}", limited.error().message);
     return static_cast<int>(baton::exit_code_of(limited.error().kind));
   }

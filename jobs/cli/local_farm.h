@@ -24,7 +24,8 @@ struct FarmOptions {
   /// File of the coordinator's key; empty: none.
   std::string server_key = {};
   std::uint64_t store_limit_mib = 0;  ///< limit of its store; 0: none
-  std::string isa = {};               ///< of the workers; empty: as the environment says
+  /// Instruction set of the workers; empty: as the environment says.
+  std::string isa = {};
 };
 
 /// A coordinator and workers on this machine, as child processes, at an address of their own. A

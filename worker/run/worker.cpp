@@ -17,6 +17,7 @@
 #include "common/base/files.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/job_json.h"
+#include "common/math/instruction_set.h"
 #include "common/protocol/worker_channel.h"
 #include "common/store/folder_token.h"
 #include "worker/accel/accel.h"
@@ -373,6 +374,8 @@ class Worker {
 };
 
 }  // namespace
+
+Status use_instruction_set(const std::string& name) { return limit_instruction_set(name); }
 
 std::string describe_worker() {
   return fmt::format("{}\nrenders with {}", build_identity(), describe_renderer());

@@ -27,6 +27,9 @@ struct WorkerOptions {
   std::chrono::seconds drain{0};
 };
 
+/// Holds this process to an instruction set, before anything is computed (limit_instruction_set).
+Status use_instruction_set(const std::string& name);
+
 /// Program version, ray tracer and instruction sets, one per line.
 std::string describe_worker();
 

@@ -404,8 +404,9 @@ class ChaosFarm {
   std::string reporter_;                             ///< of the last report
   std::map<TaskKey, std::set<std::string>> makers_;  ///< whose reports were recorded
   std::set<LeaseId> issued_;
-  std::set<LeaseId> granted_;  ///< by this coordinator, without an end so far
-  std::set<Digest> store_;     ///< the blobs that are there
+  /// By this coordinator, without an end so far.
+  std::set<LeaseId> granted_;
+  std::set<Digest> store_;                                 ///< the blobs that are there
   std::vector<std::pair<std::string, AttemptLeft>> left_;  ///< still to be said
   std::set<Digest> told_;                                  ///< of, to this coordinator
   /// Published for leases of which nobody will report.
