@@ -25,6 +25,8 @@ inline constexpr int kMaxOverscan = 4096;  // pixels on a side
 inline constexpr std::int64_t kMaxFramedValues = std::int64_t{1} << 29;
 inline constexpr int kMaxFrames = 100000;
 inline constexpr int kMaxFrameNumber = 9999999;
+/// Keys of one thing that moves: at each frame, at the one before it and at the one behind it.
+inline constexpr int kMaxKeys = 3 * kMaxFrames;
 inline constexpr int kMaxMaterials = 4096;
 inline constexpr int kMaxMeshes = 4096;
 inline constexpr int kMaxObjects = 100000;

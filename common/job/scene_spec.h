@@ -16,8 +16,8 @@ namespace baton {
 /// Row-major 3 x 4: an affine map of points.
 using Matrix34 = std::array<float, 12>;
 
-/// A node or camera of a glTF file whose animations give the keys: one a frame, at (frame -
-/// start_frame) / fps seconds.
+/// A node or camera of a glTF file whose animations give the keys: frame f is at (f - start_frame)
+/// / fps seconds.
 struct GltfMotion {
   std::string file;  ///< .gltf .glb
   std::string node;  ///< the node's name in the file
@@ -110,6 +110,9 @@ struct FileClock {
 
   double seconds_at(double frame) const {
     return (frame - static_cast<double>(start_frame)) / static_cast<double>(fps);
+  }
+  double frame_at(double seconds) const {
+    return seconds * static_cast<double>(fps) + static_cast<double>(start_frame);
   }
   bool operator==(const FileClock&) const = default;
 };

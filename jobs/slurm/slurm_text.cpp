@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 
 namespace baton {
 namespace {
@@ -36,6 +37,14 @@ std::string quoted(const std::string& text) {
   std::string word = "'";
   for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return word + "'";
+}
+
+/// As sbatch reads it: in the folder's name a percent sign is none of a pattern.
+std::string output_pattern(const std::filesystem::path& log) {
+  std::string pattern;
+  for (const char c : log.parent_path().string())
+    pattern += c == '%' ? std::string("%%") : std::string(1, c);
+  return pattern + "/" + log.filename().string();
 }
 
 SlurmState state_of(std::string_view state, std::string_view reason) {
@@ -90,6 +99,14 @@ Result<NodeRange> parse_node_range(const std::string& text) {
   return NodeRange{static_cast<int>(*least), static_cast<int>(*most)};
 }
 
+Status check_log(const PilotJob& job) {
+  if (job.script_log.find('\\') == job.script_log.npos) return {};
+  return Error{ErrorKind::usage,
+               fmt::format("{}: expected a folder without a backslash: sbatch takes none in the "
+                           "name of a log",
+                           std::filesystem::path(job.script_log).parent_path().string())};
+}
+
 std::string pilot_script(const PilotJob& job) {
   std::string text =
       "#!/bin/sh\n"
@@ -123,7 +140,7 @@ std::vector<std::string> sbatch_command(const PilotJob& job, int count, const st
                                    "--mem=0",
                                    "--open-mode=append",
                                    "--job-name=" + job.job_name,
-                                   "--output=" + job.script_log};
+                                   "--output=" + output_pattern(job.script_log)};
   if (!job.partition.empty()) command.push_back("--partition=" + job.partition);
   if (!job.time.empty()) command.push_back("--time=" + job.time);
   if (job.time_s == 0 || job.time_s >= kLongEnough_s)

@@ -28,10 +28,11 @@ inline constexpr std::string_view kJobNamePrefix = "baton-";
 
 /// What a pilot is started with.
 struct PilotJob {
-  std::string worker;      ///< path of baton-worker
-  std::string endpoint;    ///< the coordinator, as nodes reach it
-  std::string key;         ///< file; empty: none
-  std::string script_log;  ///< file; %A and %a are array and task
+  std::string worker;    ///< path of baton-worker
+  std::string endpoint;  ///< the coordinator, as nodes reach it
+  std::string key;       ///< file; empty: none
+  /// Absolute; %A and %a in its name, not in that of its folder, are array and task.
+  std::string script_log;
   /// Name by which squeue finds the pilots of this farm.
   std::string job_name;
   std::string partition;  ///< empty: Slurm's default
@@ -39,6 +40,9 @@ struct PilotJob {
   std::int64_t time_s = 0;
   std::vector<std::string> worker_arguments, sbatch_arguments;  ///< those of the user, as they are
 };
+
+/// Error usage: a folder of logs that sbatch cannot write into.
+Status check_log(const PilotJob& job);
 
 /// A shell script in which a pilot becomes a worker that has the pilot's name, all processors of
 /// its allocation, and its end.

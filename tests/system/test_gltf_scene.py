@@ -2,8 +2,10 @@
 """A glTF scene as a job: nodes, materials and animations are shown, the same for any tiling; what is wrong with the file
 is said once; the file is part of the job."""
 
+import math
+from array import array
 
-from assets import make_set, png
+from assets import make_set, png, write_exr
 from farm import check, check_equal, check_layouts, run_tests
 from jobs import make_job, write_job
 
@@ -123,6 +125,29 @@ def what_deforms_is_said(programs, folder):
     wrong = set_job(folder, alive=True, gltf={"nodes": {"reed": {"place": {"translate": [0, 1, 0]}}}})
     programs.refuses("check", write_job(folder / "wrong.json", wrong),
                      says='set.glb: node "reed": follows its bones, expected `place` of these')
+
+
+def texels_that_are_no_numbers(programs, folder):
+    """Of textures, maps and plates they count as 0; `check` and `render` say how many, once for each file."""
+    job = make_job(folder, frames="1-2", image={"width": 32, "height": 16, "sites": 1}, sampling={"method": "mis"})
+    rows = [array("f", [0.5] * 96) for _ in range(16)]
+    rows[3][6:9] = array("f", [math.nan, -math.inf, 1])
+    rows[9][30] = rows[9][33] = math.inf
+    for name in ("texture", "map", "seen", "plate"):
+        write_exr(folder / f"{name}.exr", 32, rows)
+    job["scene"]["materials"] = {name: {"type": "diffuse", "colorTexture": "texture.exr"} for name in ("chalk", "clay")}
+    job["scene"]["ground"] = {"material": "chalk"}
+    (folder / "leaf.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n", encoding="utf-8")
+    job["scene"]["meshes"] = {"leaf": "leaf.obj"}
+    job["scene"]["objects"] = [{"mesh": "leaf", "material": "clay"}]
+    job["environment"] = {"map": "map.exr", "cameraMap": "seen.exr"}
+    job["output"] |= {"background": "plate", "plate": "plate.exr", "aovs": []}
+    path = write_job(folder / "job.json", job)
+    rendered = programs.render(path, folder / "work")
+    for said in (programs.run("baton", "check", path).stdout, rendered.stdout + rendered.stderr):
+        for name, what in (("texture", "texels"), ("map", "texels"), ("seen", "texels"), ("plate", "pixels")):
+            lines = [line for line in said.splitlines() if f"/{name}.exr: 3 {what} are" in line]
+            check(len(lines) == 1 and lines[0].endswith("and count as 0"), f"{name}: {lines} of\n{said}")
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import shutil
 import time
 from pathlib import Path
 
-from farm import OK, Farm, Process, check, check_equal, run_tests, wait_until
+from farm import OK, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
 from slurm_cluster import Cluster
 
@@ -212,6 +212,29 @@ def pilots_that_cannot_work_are_told_of(programs, folder):
         time.sleep(3)  # some looks, and far from a minute
         check_equal(farm.num_arrays(), 2, f"arrays\n{farm.log()}")
         farm.stop()
+
+
+def folders_have_any_name(programs, folder):
+    """Also one that sbatch would read as a pattern; the pilots' logs are there. A backslash, at which sbatch reads no pattern,
+    is refused at once."""
+    with Cluster(folder / "slurm", nodes=1) as cluster:
+        for number, name in enumerate(("take_%j, 100%", "%A_%a", "it's", "back\\slash")):
+            place = folder / str(number) / name
+            path = write_job(place / "job.json", make_job(place, frames="1-2", image={"width": 16, "height": 16}))
+            command = [programs.path("baton"), "farm", "slurm", str(path), "--nodes", "1", "--time=5", "--poll", "0.5",
+                       "--host", "127.0.0.1"]
+            farm = Process(command, folder / f"{number}.log", cluster.environment)
+            try:
+                expected = USAGE if "\\" in name else OK
+                check_equal(farm.wait(60), expected, f"exit code in {name}\n{farm.log()}")
+            finally:
+                farm.kill()
+            if expected == USAGE:
+                check_says(farm.log(), f"{name}/frames/.baton/slurm: expected a folder without a backslash")
+                continue
+            check_equal(len(list((place / "frames").glob("*.exr"))), 2, f"frames in {name}")
+            logs = [log for log in (folder / str(number)).rglob("*.log") if re.fullmatch(r"\d+_1\.log", log.name)]
+            check(logs and all("slurm" in log.parts for log in logs), f"logs of pilots in {name}: {logs}")
 
 
 def the_recipes_do_without_the_command(programs, folder):

@@ -40,7 +40,7 @@ struct FrameGeometry {
   SeenSurface see(const SurfaceHit& hit, const SurfaceShading* shading = nullptr) const {
     const Material& material = material_of(hit);
     if (material.detail == nullptr) return {hit.point, material, {}};
-    if (shading != nullptr) return shading->at(hit.point);
+    if (shading != nullptr) return shading->at(hit.point, material);
     return see_detail(*scene, pose.instances[hit.instance], hit.place, hit.point, pose.shapes);
   }
   /// Where the point of a hit of this frame is in another pose, and its shading normal.

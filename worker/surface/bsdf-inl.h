@@ -227,7 +227,7 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     const VF m2 = hn::Mul(m, m);
     const VF schlick = hn::Mul(hn::Mul(m2, m2), m);
     const VF keep = hn::Sub(one, schlick);
-    const VF kept = hn::NegMulAdd(s.lobe_scale, schlick, one);  // F90 = 0: there is no lobe
+    const VF kept = hn::NegMulAdd(s.mirror.x, schlick, one);  // F90 = 0: there is no lobe
     out.diffuse = hn::IfThenElse(s.is_ggx, hn::Mul(out.diffuse, kept), out.diffuse);
     out.lobe = hn::IfThenElse(s.is_ggx, hn::Mul(g.dv, keep), out.lobe);
     out.white = hn::IfThenElseZero(s.is_ggx, hn::Mul(hn::Mul(g.dv, schlick), s.lobe_scale));

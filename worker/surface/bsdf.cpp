@@ -56,7 +56,7 @@ Rgb evaluate_ggx(const Material& m, const ShadingPoint& p, const Vec3& wi) {
   const float t2 = t * t;
   const float grazing = t2 * t2 * t;
   const Rgb fresnel = m.ks + (Rgb{m.f90, m.f90, m.f90} - m.ks) * grazing;
-  const Rgb kept = (Rgb{1, 1, 1} - m.ks) * (1 - m.f90 * grazing);
+  const Rgb kept = (Rgb{1, 1, 1} - m.dielectric_f0) * (1 - m.dielectric_f90 * grazing);
   const Rgb diffuse = kept * m.kd * diffuse_left(m, cos_o);
   return diffuse * kInvPi + fresnel * specular;
 }

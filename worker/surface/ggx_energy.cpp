@@ -99,12 +99,13 @@ Rgb diffuse_left(const Material& material, float cos_view) {
   static const AlbedoTable kTable;
   const Albedo albedo = kTable.look_up(cos_view, material.shape);
   const auto left = [&](float kd, float f0) {
-    const float lobe = f0 * albedo.head_on + material.f90 * albedo.grazing;
-    const float diffuse = kd * (1 - f0) * (1 - material.f90 * albedo.schlick);
+    const float lobe = f0 * albedo.head_on + material.dielectric_f90 * albedo.grazing;
+    const float color = kd / (1 - material.metallic);
+    const float diffuse = color * (1 - f0) * (1 - material.dielectric_f90 * albedo.schlick);
     return diffuse > 0 ? std::clamp((1 - lobe) / diffuse, 0.0f, 1.0f) : 1.0f;
   };
-  return {left(material.kd.x, material.ks.x), left(material.kd.y, material.ks.y),
-          left(material.kd.z, material.ks.z)};
+  const Rgb& f0 = material.dielectric_f0;
+  return {left(material.kd.x, f0.x), left(material.kd.y, f0.y), left(material.kd.z, f0.z)};
 }
 
 }  // namespace baton

@@ -254,11 +254,12 @@ SurfaceShading SurfaceShading::of(const SeenSurface& seen) {
           .shape = m.shape,
           .specular_probability = m.specular_probability,
           .f90 = m.f90,
+          .metallic = m.metallic,
           .lobe = m.lobe,
           .coat = m.coat};
 }
 
-SeenSurface SurfaceShading::at(const ShadingPoint& point) const {
+SeenSurface SurfaceShading::at(const ShadingPoint& point, const Material& material) const {
   SeenSurface seen{point,
                    {.lobe = lobe,
                     .kd = kd,
@@ -266,6 +267,9 @@ SeenSurface SurfaceShading::at(const ShadingPoint& point) const {
                     .shape = shape,
                     .specular_probability = specular_probability,
                     .f90 = f90,
+                    .dielectric_f0 = material.dielectric_f0,
+                    .dielectric_f90 = material.dielectric_f90,
+                    .metallic = metallic,
                     .coat = coat},
                    emission};
   seen.point.ns = ns;

@@ -27,13 +27,13 @@ inline SeenSurface as_catcher(ShadingPoint point, const Rgb& albedo) {
 struct SurfaceShading {
   Vec3 ns{};  ///< shading normal
   Rgb kd{}, ks{}, emission{};
-  float shape = 1, specular_probability = 0, f90 = 1;
+  float shape = 1, specular_probability = 0, f90 = 1, metallic = 0;
   Material::Lobe lobe = Material::Lobe::none;
   Coat coat{};
 
   static SurfaceShading of(const SeenSurface& seen);
-  /// At the place where it was seen.
-  SeenSurface at(const ShadingPoint& point) const;
+  /// At the place where it was seen. material: of the scene, for what is the same everywhere.
+  SeenSurface at(const ShadingPoint& point, const Material& material) const;
 };
 
 /// The surface at a hit of `instance`, whose material has detail. point: with the normals of the

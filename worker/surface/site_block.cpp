@@ -56,10 +56,11 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
   set(ng_x, ng_y, ng_z, point.ng);
   const Vec3 wo = ggx ? clamped_view(point) : point.wo;
   set(wo_x, wo_y, wo_z, wo);
-  set(mirror_x, mirror_y, mirror_z, reflect(wo, point.ns));
+  set(mirror_x, mirror_y, mirror_z,
+      ggx ? Vec3{material.dielectric_f90, 0, 0} : reflect(wo, point.ns));
   const float cos_view = ggx ? std::max(dot(point.ns, wo), kMinCosView) : 1.0f;
   set(kd_r, kd_g, kd_b,
-      ggx ? material.kd * (Rgb{1, 1, 1} - material.ks) * diffuse_left(material, cos_view)
+      ggx ? material.kd * (Rgb{1, 1, 1} - material.dielectric_f0) * diffuse_left(material, cos_view)
           : material.kd);
   set(ks_r, ks_g, ks_b, ggx || phong ? material.ks : Rgb{});
   shape[s] = material.shape;

@@ -16,11 +16,12 @@ struct alignas(64) SiteBlock {
   /// A cache line more, so that the same site of several arrays is not in one set of a cache.
   using Array = std::array<float, kMaxSites + 16>;
 
-  Array ns_x{}, ns_y{}, ns_z{};              ///< shading normal
-  Array ng_x{}, ng_y{}, ng_z{};              ///< geometric normal
-  Array wo_x{}, wo_y{}, wo_z{};              ///< to the viewer
-  Array mirror_x{}, mirror_y{}, mirror_z{};  ///< wo mirrored about ns
-  /// Diffuse albedo; ggx: kd (1 - F0) diffuse_left().
+  Array ns_x{}, ns_y{}, ns_z{};  ///< shading normal
+  Array ng_x{}, ng_y{}, ng_z{};  ///< geometric normal
+  Array wo_x{}, wo_y{}, wo_z{};  ///< to the viewer
+  /// Phong: wo mirrored about ns; ggx: x is F90 of what is no metal.
+  Array mirror_x{}, mirror_y{}, mirror_z{};
+  /// Diffuse albedo; ggx: kd (1 - F0 of what is no metal) diffuse_left().
   Array kd_r{}, kd_g{}, kd_b{};
   Array ks_r{}, ks_g{}, ks_b{};  ///< phong: specular albedo; ggx: F0
   Array shape{};                 ///< phong: exponent; ggx: alpha

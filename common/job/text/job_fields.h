@@ -20,6 +20,8 @@ inline constexpr NumberRange kCoordinateRange{-1e9, 1e9};
 /// Radiance.
 inline constexpr NumberRange kLightRange{0, 1e9};
 inline constexpr NumberRange kFrameRange{0, limits::kMaxFrameNumber};
+/// Of keys of motion, which vectors from and to the frames beside a frame show.
+inline constexpr NumberRange kPoseRange{-1, limits::kMaxFrameNumber + 1};
 /// Factors that may be zero.
 inline constexpr NumberRange kFactorRange{0, 1e9};
 /// Lengths and factors above zero.

@@ -7,6 +7,7 @@
 #include <set>
 #include <string_view>
 
+#include "common/job/aov.h"
 #include "common/job/motion.h"
 #include "common/job/plan/sequence.h"
 
@@ -116,21 +117,26 @@ Digest light_facts(const EnvironmentSpec& environment, FrameNumber frame,
   return digest_of(writer.bytes());
 }
 
-Digest camera_facts(const JobSpec& job, FrameNumber frame) {
-  const CameraSpec camera = camera_at(job, frame.value());
+/// frames: at which the camera is looked at.
+Digest camera_facts(const JobSpec& job, const std::vector<FrameNumber>& frames) {
   ByteWriter writer;
-  for (const Vec3& v : {camera.position, camera.look_at, camera.up}) put(writer, v);
-  writer.put(camera.vertical_fov_deg);
+  for (const FrameNumber frame : frames) {
+    const CameraSpec camera = camera_at(job, frame.value());
+    for (const Vec3& v : {camera.position, camera.look_at, camera.up}) put(writer, v);
+    writer.put(camera.vertical_fov_deg);
+  }
   return digest_of(writer.bytes());
 }
 
-Digest object_facts(const JobSpec& job, FrameNumber frame) {
+/// frames: at which objects are looked at.
+Digest object_facts(const JobSpec& job, const std::vector<FrameNumber>& frames) {
   ByteWriter writer;
   for (const ObjectSpec& object : job.scene.objects) {
-    if (!moves(object)) continue;
-    const Transform pose = object_motion_at(object, job.motion.curve, frame.value());
-    for (const float x : pose.linear.m) writer.put(x);
-    put(writer, pose.offset);
+    for (std::size_t i = 0; moves(object) && i < frames.size(); ++i) {
+      const Transform pose = object_motion_at(object, job.motion.curve, frames[i].value());
+      for (const float x : pose.linear.m) writer.put(x);
+      put(writer, pose.offset);
+    }
   }
   return digest_of(writer.bytes());
 }
@@ -170,12 +176,15 @@ std::vector<std::string> picture_differences(const ParsedJobDocument& a,
   return {differences.begin(), differences.end()};
 }
 
-std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDocument& document) {
+std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDocument& document,
+                                                              bool with_motion) {
   const std::map<std::string, Digest> contents = contents_of(document);
   std::vector<Facts> facts;
   for (const FrameNumber frame : document.job.frames) {
+    std::vector<FrameNumber> poses{frame};
+    if (with_motion) poses = {frame - 1, frame, frame + 1};
     facts.push_back({light_facts(document.job.environment, frame, contents),
-                     camera_facts(document.job, frame), object_facts(document.job, frame)});
+                     camera_facts(document.job, poses), object_facts(document.job, poses)});
   }
   return facts;
 }
@@ -195,10 +204,11 @@ std::vector<Digest> FrameComparison::plates_of(const ParsedJobDocument& document
 FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b)
     : frames_a_(a.job.frames),
       frames_b_(b.job.frames),
+      with_motion_(has_aov(a.job, Aov::motion) && has_aov(b.job, Aov::motion)),
       sweeps_a_(static_cast<std::size_t>(a.job.quality.sweeps)),
       sweeps_b_(static_cast<std::size_t>(b.job.quality.sweeps)),
-      a_(facts_of(a)),
-      b_(facts_of(b)),
+      a_(facts_of(a, with_motion_)),
+      b_(facts_of(b, with_motion_)),
       plates_a_(plates_of(a)),
       plates_b_(plates_of(b)),
       carried_(carries_state(a.job) || carries_state(b.job)) {
@@ -236,7 +246,8 @@ std::string FrameComparison::difference(FrameIndex frame_a, FrameIndex frame_b) 
     const char* const what = !(a.light == b.light)     ? "$.environment"
                              : !(a.camera == b.camera) ? "$.camera.keys"
                                                        : "$.scene.objects: keys";
-    return std::string(what) + " at frame " + std::to_string(frame.value());
+    return std::string(what) + (with_motion_ ? " around frame " : " at frame ") +
+           std::to_string(frame.value());
   }
   if (sweeps_a_ != sweeps_b_) return "$.quality.sweeps";
   return "$.frames before frame " + std::to_string(frame.value()) + " (samples are carried)";

@@ -30,7 +30,7 @@ void check_view(JobArchive& a, const Vec3& position, const Vec3& look_at, const 
 
 /// up: of a key that has none.
 void fields(JobArchive& a, CameraKey& key, const Vec3& up) {
-  a.number(required("frame"), key.frame, kFrameRange);
+  a.number(required("frame"), key.frame, kPoseRange);
   a.vector(required("position"), key.position, kCoordinateRange);
   a.vector(required("lookAt"), key.look_at, kCoordinateRange);
   if (!a.vector("up", key.up, kCoordinateRange)) key.up = up;
@@ -39,7 +39,7 @@ void fields(JobArchive& a, CameraKey& key, const Vec3& up) {
 }
 
 void fields(JobArchive& a, ObjectKey& key) {
-  a.number(required("frame"), key.frame, kFrameRange);
+  a.number(required("frame"), key.frame, kPoseRange);
   a.vector("translate", key.translate, kCoordinateRange);
   a.vector("rotateDeg", key.rotate_deg, kAngleRange);
   std::array<double, 4> quaternion{key.quaternion[0], key.quaternion[1], key.quaternion[2],
@@ -70,7 +70,7 @@ void gltf_field(JobArchive& a, std::optional<GltfMotion>& gltf) {
 template <class K, class... More>
 void key_fields(JobArchive& a, std::vector<K>& keys, const std::optional<GltfMotion>& gltf,
                 const More&... more) {
-  a.list("keys", keys, limits::kMaxFrames, [&](K& key) { fields(a, key, more...); });
+  a.list("keys", keys, limits::kMaxKeys, [&](K& key) { fields(a, key, more...); });
   check_ascending(a, "keys", keys);
   if (gltf && !keys.empty()) a.fault("gltf", "either keys or gltf", "both");
 }

@@ -23,7 +23,8 @@ std::vector<std::string> picture_differences(const ParsedJobDocument& a,
                                              const ParsedJobDocument& b);
 
 /// What two jobs show in their frames, for jobs of one picture digest: the number of a frame, its
-/// light with the contents of its maps, the camera and the poses of all that moves.
+/// light with the contents of its maps, the camera and the poses of all that moves; where both show
+/// motion, those at the frame numbers one less and one more, too.
 class FrameComparison {
  public:
   FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b);
@@ -47,10 +48,11 @@ class FrameComparison {
     Digest light, camera, objects;
     bool operator==(const Facts&) const = default;
   };
-  static std::vector<Facts> facts_of(const ParsedJobDocument& document);
+  static std::vector<Facts> facts_of(const ParsedJobDocument& document, bool with_motion);
   static std::vector<Digest> plates_of(const ParsedJobDocument& document);
 
   std::vector<FrameNumber> frames_a_, frames_b_;
+  bool with_motion_;  ///< both have the AOV
   std::size_t sweeps_a_, sweeps_b_;
   std::vector<Facts> a_, b_;
   std::vector<Digest> plates_a_, plates_b_;  ///< by frame; a digest of zeros: none

@@ -116,6 +116,10 @@ class AnimatedShape final : public Deformation {
     const double seconds = by_.animation->seconds_at(frame);
     return shaper_.shape(motion_->to_world(seconds), motion_->weights(by_.node, seconds));
   }
+  std::array<double, 2> moving_frames() const override {
+    const auto [first, last] = motion_->seconds().value_or(std::array<double, 2>{});
+    return {by_.animation->frame_at(first), by_.animation->frame_at(last)};
+  }
   std::uint64_t size_bytes() const override { return shaper_.size_bytes(); }
 
  private:

@@ -303,6 +303,19 @@ Result<int> NodeMotion::find(const std::string& name) const {
   return document_->error(fmt::format("no node \"{}\"{}", name, suggestion(name, names)));
 }
 
+std::optional<std::array<double, 2>> NodeMotion::seconds() const {
+  std::optional<std::array<double, 2>> range;
+  for (const Moved& moved : curves_) {
+    for (const auto* curve : {&moved.translation, &moved.rotation, &moved.scale, &moved.weights}) {
+      if (!*curve) continue;
+      const double first = (*curve)->times.front(), last = (*curve)->times.back();
+      range = range ? std::array{std::min((*range)[0], first), std::max((*range)[1], last)}
+                    : std::array{first, last};
+    }
+  }
+  return range;
+}
+
 void NodeMotion::place(int node, const Matrix& local) {
   curves_[static_cast<std::size_t>(node)].placed = local;
   find_what_moves();

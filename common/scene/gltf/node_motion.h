@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,6 +61,8 @@ class NodeMotion {
   bool morphs(int node) const {
     return curves_[static_cast<std::size_t>(node)].weights.has_value();
   }
+  /// The times of the first key and of the last one; none: nothing moves.
+  std::optional<std::array<double, 2>> seconds() const;
   /// Puts a node elsewhere below its parent, and at rest there.
   void place(int node, const Matrix& local);
   /// From each node to the world of the file.

@@ -141,6 +141,8 @@ Result<DetailLoader::TexturePtr> DetailLoader::load_texture(const TextureSpec& s
     notes_.insert(fmt::format("{}: {}", name_of(spec), note));
   BATON_TRY(to_linear_colors(image, use, name_of(spec)));
   BATON_ASSIGN(TexturePtr texture, Texture::build(image, use, name_of(spec)));
+  for (const std::string& note : repair_notes(texture->repairs()))
+    notes_.insert(fmt::format("{}: {}", name_of(spec), note));
   size_bytes_ += texture->size_bytes();
   if (size_bytes_ > limits::kMaxTextureBytes)
     return Error{ErrorKind::bad_input,

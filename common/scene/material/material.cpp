@@ -14,6 +14,9 @@ float specular_share(float specular, float diffuse) {
   return sum > 0 ? specular / sum : 0.0f;
 }
 
+/// Over the cosine-weighted hemisphere, where Schlick's term averages to 1/21.
+float mean_fresnel(const Rgb& f0, float f90) { return mean(f0) + (f90 - mean(f0)) / 21; }
+
 float coat_roughness(const MaterialSpec& spec) {
   return spec.clearcoat_roughness.value_or(kLeastRoughness);
 }
@@ -49,19 +52,24 @@ Material make_material(const MaterialSpec& spec, const Rgb& base_color, float me
     }
     case MaterialKind::metallic_roughness: {
       const Rgb kd = base_color * (1 - metallic);
-      const Rgb f0 = dielectric_f0(spec) * (1 - metallic) + base_color * metallic;
+      const Rgb plain_f0 = dielectric_f0(spec);
+      const float plain_f90 = 1 - (1 - spec.specular);  // as f90, to the bit
+      const Rgb f0 = plain_f0 * (1 - metallic) + base_color * metallic;
       const float f90 = 1 - (1 - spec.specular) * (1 - metallic);
-      // Schlick's term averages to 1/21 over the cosine-weighted hemisphere.
-      const float fresnel = mean(f0) + (f90 - mean(f0)) / 21;
+      const float fresnel = mean_fresnel(f0, f90);
+      const float diffuse = mean(kd) * (1 - mean_fresnel(plain_f0, plain_f90));
       return {.lobe = Material::Lobe::ggx,
               .kd = kd,
               .ks = f0,
               .shape = roughness * roughness,
-              .specular_probability = specular_share(fresnel, mean(kd) * (1 - fresnel)),
+              .specular_probability = specular_share(fresnel, diffuse),
               .f90 = f90,
+              .dielectric_f0 = plain_f0,
+              .dielectric_f90 = plain_f90,
+              .metallic = metallic,
               .coat = {.weight = spec.clearcoat.value_or(0),
                        .alpha = coat_roughness(spec) * coat_roughness(spec),
-                       .base_albedo = fresnel + mean(kd) * (1 - fresnel)}};
+                       .base_albedo = fresnel + diffuse}};
     }
     case MaterialKind::measured:
       break;

@@ -26,14 +26,15 @@ struct Coat {
 };
 
 /// A material in the one form that all code evaluates. lobe measured: f is the table. Else:
-///   f = kd/pi [* (1 - F) for ggx] + specular lobe,
+///   f = kd/pi [* (1 - F) of what is no metal, for ggx] + specular lobe,
 /// lobe phong: ks (s+2)/(2 pi) max(0, r.wi)^s, r the mirror direction of wo about the shading
 /// normal
 ///   [Lafortune & Willems 1994; the papers' model];
-/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick from F0 = ks to f90 [glTF 2.0, appendix B;
-/// KHR_materials_specular]; the diffuse part takes f90 as 1. As published, a white and smooth
-///   dielectric gains energy at grazing view (albedo 1.03 at 60, 1.6 at 85 degrees); a metal never
-///   does.
+/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick from F0 = ks to f90 [KHR_materials_specular]. A
+///   metal and what is none are mixed by `metallic` [glTF 2.0, appendix B.2]: as both have one D
+///   and G2, the mix has one lobe, with the means of their F0 and F90; the diffuse part gives way
+///   to the lobe of what is no metal alone. As published, a white and smooth dielectric gains
+///   energy at grazing view (albedo 1.03 at 60, 1.6 at 85 degrees); a metal never does.
 struct Material {
   enum class Lobe : std::uint8_t { none, phong, ggx, measured };
 
@@ -47,6 +48,10 @@ struct Material {
   /// Measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha.
   std::shared_ptr<const MeasuredBrdf> table{};
   float f90 = 1;  ///< ggx
+  /// ggx: F0 and F90 of what is no metal; the same wherever a material is.
+  Rgb dielectric_f0{};
+  float dielectric_f90 = 1;
+  float metallic = 0;  ///< ggx: share of metal, in kd already
   /// What differs from place to place, glows or is not there (surface_detail.h); null: nothing. The
   /// rest is then only what methods look at ahead.
   std::shared_ptr<const SurfaceDetail> detail{};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -35,6 +36,8 @@ class Deformation {
   /// Where they are at a frame number, finite: a pure function. Those of one mesh have the same
   /// parts in all frames.
   virtual MeshShape at(double frame) const = 0;
+  /// The frame numbers between which it moves; it rests before and behind them.
+  virtual std::array<double, 2> moving_frames() const = 0;
   virtual std::uint64_t size_bytes() const = 0;
 };
 

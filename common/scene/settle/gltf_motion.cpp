@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+
+#include "common/base/limits.h"
 
 namespace baton {
 namespace {
@@ -48,6 +51,24 @@ CameraKey camera_key(double frame, const gltf::Matrix& to_world) {
 
 }  // namespace
 
+KeyFrames key_frames(const gltf::NodeMotion& motion, const FileClock& clock,
+                     const std::vector<FrameNumber>& frames, std::size_t most) {
+  std::set<FrameNumber> numbers;
+  for (const FrameNumber frame : frames) numbers.insert({frame - 1, frame, frame + 1});
+  KeyFrames keys;
+  if (const auto seconds = motion.seconds()) {
+    const auto frame_at = [&](double at) {
+      return std::clamp(clock.frame_at(at), -1.0, limits::kMaxFrameNumber + 1.0);
+    };
+    const auto first = static_cast<int>(std::floor(frame_at((*seconds)[0])));
+    const auto last = static_cast<int>(std::ceil(frame_at((*seconds)[1])));
+    keys.whole = static_cast<std::size_t>(last - first) < most;
+    for (int number = first; keys.whole && number <= last; ++number) numbers.emplace(number);
+  }
+  keys.frames.assign(numbers.begin(), numbers.end());
+  return keys;
+}
+
 Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,
                   const std::vector<FrameNumber>& frames, CameraSpec& camera) {
   const gltf::Document& file = motion.document();
@@ -76,13 +97,15 @@ Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clo
     const std::vector<gltf::Matrix> world = motion.to_world(clock.seconds_at(frame.value()));
     return camera_key(frame.value(), world[static_cast<std::size_t>(node)]);
   };
-  const CameraKey first = at(frames.front());
-  camera.position = first.position;
-  camera.look_at = first.look_at;
-  camera.up = first.up;
-  for (const FrameNumber frame : frames) {
-    if (motion.moves(node)) camera.keys.push_back(at(frame));
+  if (motion.moves(node)) {
+    for (const FrameNumber frame : key_frames(motion, clock, frames, limits::kMaxFrames).frames)
+      camera.keys.push_back(at(frame));
+    return {};
   }
+  const CameraKey rest = at(frames.front());
+  camera.position = rest.position;
+  camera.look_at = rest.look_at;
+  camera.up = rest.up;
   return {};
 }
 
@@ -120,10 +143,11 @@ Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& obje
   BATON_ASSIGN(const auto opened, open_moving(gltf, left_out));
   const FileClock clock{gltf.fps, gltf.start_frame};
   std::vector<Matrix34> matrices;
-  for (const FrameNumber frame : frames)
+  const KeyFrames keys = key_frames(opened.first, clock, frames, limits::kMaxFrames);
+  for (const FrameNumber frame : keys.frames)
     matrices.push_back(gltf::to_floats(opened.first.to_world(
         clock.seconds_at(frame.value()))[static_cast<std::size_t>(opened.second)]));
-  object.keys = matrix_keys(frames, matrices);
+  object.keys = matrix_keys(keys.frames, matrices);
   object.gltf.reset();
   return {};
 }

@@ -9,9 +9,21 @@
 
 namespace baton {
 
-/// Replace `gltf` by keys, one for each frame number: where the file's animations have the node
-/// then, in the world of the file. Errors name the file: missing, not a glTF file, no such node, a
-/// node that no animation moves. left_out: gets what is odd about the animations.
+/// The frame numbers at which keys of a file are taken.
+struct KeyFrames {
+  std::vector<FrameNumber> frames;  ///< ascending
+  /// With all from the first key of the animations to the last: those of every job of the shot.
+  bool whole = false;
+};
+/// Each of a job's frames with the one before and the one behind, between which motion vectors lie,
+/// so that what a frame shows does not depend on the others; and all of the animations, if these
+/// are at most `most`.
+KeyFrames key_frames(const gltf::NodeMotion& motion, const FileClock& clock,
+                     const std::vector<FrameNumber>& frames, std::size_t most);
+
+/// Replace `gltf` by keys at key_frames of a job's frames: where the file's animations have the
+/// node then, in the world of the file. Errors name the file: missing, not a glTF file, no such
+/// node, a node that no animation moves. left_out: gets what is odd about the animations.
 
 /// The node must hold a camera, which also gives the angle of view.
 Status take_camera_keys(const std::vector<FrameNumber>& frames, CameraSpec& camera,
@@ -23,8 +35,8 @@ Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& obje
 /// Adds what is odd about the animations, unless it is said already.
 void add_notes(const gltf::NodeMotion& motion, std::vector<std::string>& left_out);
 
-/// Makes `camera` that of a node: with keys where it moves, at one place where it does not. Error:
-/// the node holds no camera.
+/// Makes `camera` that of a node: with keys where it moves, at one place where it does not. frames:
+/// of the job. Error: the node holds no camera.
 Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,
                   const std::vector<FrameNumber>& frames, CameraSpec& camera);
 

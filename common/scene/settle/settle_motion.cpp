@@ -78,20 +78,27 @@ void add_ground(const JobSpec& job, const Camera& camera, StepMeter& meter) {
   }
 }
 
-/// The frames between which motion is measured: from the first key to the last, in the job's step,
-/// so that all jobs of a shot measure the same; where meshes deform, which have no keys, the job's
-/// frames, too.
-std::vector<FrameNumber> measured_frames(const JobSpec& job) {
+/// Vertices of meshes that deform, over all frames, up to which motion is measured in all of a
+/// shot.
+constexpr double kMostShaped = 1e8;
+
+/// The frames between which motion is measured: from the first key to the last, those of the
+/// animations of meshes included, in the job's step, so that all jobs of a shot measure the same.
+/// Where that is too much, the job's frames.
+std::vector<FrameNumber> measured_frames(const JobSpec& job, const Scene& scene) {
   std::vector<double> keys;
   const auto add = [&](const auto& list) {
     for (const auto& key : list) keys.push_back(key.frame);
   };
   add(job.camera.keys);
   for (const ObjectSpec& object : job.scene.objects) add(object.keys);
-  const bool deforms =
-      std::ranges::any_of(job.scene.meshes, [](const auto& mesh) { return mesh.second.deforms(); });
-  if (deforms && !keys.empty())
-    keys.insert(keys.end(), {job.frames.front().value() * 1.0, job.frames.back().value() * 1.0});
+  double shaped = 0;
+  for (const TriangleMesh& mesh : scene.meshes) {
+    if (mesh.deformation == nullptr) continue;
+    const std::array<double, 2> moving = mesh.deformation->moving_frames();
+    keys.insert(keys.end(), moving.begin(), moving.end());
+    shaped += static_cast<double>(mesh.positions.size());
+  }
   const auto [first, last] = std::minmax_element(keys.begin(), keys.end());
   if (first == keys.end()) return job.frames;
   int step = 1;
@@ -100,7 +107,8 @@ std::vector<FrameNumber> measured_frames(const JobSpec& job) {
     for (std::size_t i = 2; i < job.frames.size(); ++i)
       step = std::min(step, job.frames[i] - job.frames[i - 1]);
   }
-  if ((*last - *first) / step > limits::kMaxFrames) return job.frames;
+  const double steps = (*last - *first) / step;
+  if (steps > limits::kMaxFrames || steps * shaped > kMostShaped) return job.frames;
   std::vector<FrameNumber> frames;
   for (int frame = static_cast<int>(std::floor(*first)); frame < *last + step; frame += step)
     frames.emplace_back(frame);
@@ -110,7 +118,7 @@ std::vector<FrameNumber> measured_frames(const JobSpec& job) {
 /// An estimate is enough: a pixel that moved farther starts afresh.
 int measure_max_px(const JobSpec& job, const Scene& scene) {
   float largest = 0;
-  const std::vector<FrameNumber> frames = measured_frames(job);
+  const std::vector<FrameNumber> frames = measured_frames(job, scene);
   Pose before = pose_at(scene, job, frames.front().value());
   for (const FrameNumber frame : frames) {
     Pose now = pose_at(scene, job, frame.value());

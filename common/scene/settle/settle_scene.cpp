@@ -96,19 +96,23 @@ class SceneTaker {
     return follow_nodes();
   }
 
-  /// Where all nodes are in the first frame, and those with meshes that move in all frames.
+  /// Where all nodes are in the first frame, and those with meshes that move at all keys.
   Status follow_nodes() {
     for (const int node : gltf::shown_nodes(file_)) {
       const gltf::Node& given = file_.nodes[static_cast<std::size_t>(node)];
       if (motion_.moves(node) && given.mesh >= 0 && given.skin < 0)
         moved_[static_cast<std::size_t>(node)];
     }
-    if (moved_.size() * job_.frames.size() > limits::kMaxGltfKeys) return too_many_keys();
-    for (const FrameNumber frame : job_.frames) {
-      if (!rest_.empty() && moved_.empty()) break;
-      const std::vector<gltf::Matrix> world = motion_.to_world(clock().seconds_at(frame.value()));
+    const auto world_at = [&](FrameNumber frame) {
+      return motion_.to_world(clock().seconds_at(frame.value()));
+    };
+    rest_ = world_at(job_.frames.front());
+    if (moved_.empty()) return {};
+    keys_ = key_frames(motion_, clock(), job_.frames, limits::kMaxGltfKeys / moved_.size());
+    if (moved_.size() * keys_.frames.size() > limits::kMaxGltfKeys) return too_many_keys();
+    for (const FrameNumber frame : keys_.frames) {
+      const std::vector<gltf::Matrix> world = world_at(frame);
       for (auto& [node, matrices] : moved_) matrices.push_back(world[node]);
-      if (rest_.empty()) rest_ = world;
     }
     return {};
   }
@@ -222,8 +226,9 @@ class SceneTaker {
       std::vector<Matrix34> matrices;
       for (const gltf::Matrix& world : moved->second)
         matrices.push_back(gltf::to_floats(gltf::multiply(world, place)));
-      if (std::ranges::all_of(matrices, is_flat)) return false;
-      object.keys = matrix_keys(job_.frames, matrices);
+      // Which objects there are is the same for all jobs of the file.
+      if (keys_.whole && std::ranges::all_of(matrices, is_flat)) return false;
+      object.keys = matrix_keys(keys_.frames, matrices);
     } else {
       object.matrix = gltf::to_floats(gltf::multiply(rest_[node], place));
       if (is_flat(*object.matrix)) return false;
@@ -284,7 +289,8 @@ class SceneTaker {
   std::vector<const GltfNodeSpec*> said_;          ///< by node; null: nothing
   std::vector<PlacedNode> places_;                 ///< that the job says
   std::vector<gltf::Matrix> rest_;                 ///< by node, in the first frame
-  std::map<std::size_t, std::vector<gltf::Matrix>> moved_;  ///< by node that moves, (frames)
+  KeyFrames keys_;                                 ///< of the nodes that move
+  std::map<std::size_t, std::vector<gltf::Matrix>> moved_;  ///< by node that moves, (keys)
   std::set<int> used_materials_;
   std::map<std::pair<int, std::size_t>, bool> solid_;  ///< parts of meshes that have triangles
   std::size_t num_keys_ = 0;

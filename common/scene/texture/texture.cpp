@@ -76,12 +76,35 @@ std::vector<float> linear_values(const Image& image, TextureUse use) {
   return values;
 }
 
-/// What a texture can hold: none below 0, and no NaN.
-void limit(std::vector<float>& values) {
-  for (float& v : values) v = v > 0 ? std::min(v, kBrightest) : 0;
+/// Makes values, (texels, channels), what a texture can hold.
+TextureRepairs limit(std::vector<float>& values, std::size_t channels) {
+  TextureRepairs repairs;
+  for (std::size_t texel = 0; texel < values.size(); texel += channels) {
+    bool is_unusable = false, is_too_bright = false;
+    for (float& v : std::span(values).subspan(texel, channels)) {
+      const bool is_usable = v >= 0 && std::isfinite(v);
+      is_unusable = is_unusable || !is_usable;
+      is_too_bright = is_too_bright || (is_usable && v > kBrightest);
+      v = is_usable ? std::min(v, kBrightest) : 0;
+    }
+    repairs.unusable += is_unusable ? 1 : 0;
+    repairs.too_bright += is_too_bright ? 1 : 0;
+  }
+  return repairs;
 }
 
 }  // namespace
+
+std::vector<std::string> repair_notes(const TextureRepairs& repairs) {
+  std::vector<std::string> notes;
+  if (repairs.unusable > 0)
+    notes.push_back(
+        fmt::format("{} texels are negative, NaN or infinite and count as 0", repairs.unusable));
+  if (repairs.too_bright > 0)
+    notes.push_back(
+        fmt::format("{} texels are brighter than {} and cut", repairs.too_bright, kBrightest));
+  return notes;
+}
 
 std::vector<float> linear_colors(const Image& image) {
   return linear_values(image, TextureUse::light);
@@ -169,7 +192,7 @@ Result<std::shared_ptr<const Texture>> Texture::build(const Image& image, Textur
   auto texture = std::make_shared<Texture>();
   texture->channels_ = static_cast<std::int32_t>(num_kept);
   std::vector<float> values = linear_values(image, use);
-  limit(values);
+  texture->repairs_ = limit(values, num_kept);
   const float brightest = *std::max_element(values.begin(), values.end());
   texture->scale_ = std::max(brightest, 1.0f) / kFullScale;
 

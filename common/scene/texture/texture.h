@@ -64,6 +64,16 @@ struct TexelArray {
   float scale;             ///< value of the number 1
 };
 
+/// Texels of an image with a channel, of those that are kept, that a texture cannot hold.
+struct TextureRepairs {
+  /// Negative, NaN or infinite: the channel counts as 0.
+  std::uint64_t unusable = 0;
+  /// Above the largest half float: the channel is cut to it.
+  std::uint64_t too_bright = 0;
+};
+/// What is to be said of them, a line each.
+std::vector<std::string> repair_notes(const TextureRepairs& repairs);
+
 /// An image and its halves, quarters ... down to one texel, in memory, 2 bytes a channel. Each
 /// texel of a smaller image is the mean of those that it covers, taken of linear light; beyond the
 /// edge of each lies the edge of the image, not its own.
@@ -78,6 +88,7 @@ class Texture {
   std::int32_t height() const { return levels_.front().height; }
   std::int32_t num_levels() const { return static_cast<std::int32_t>(levels_.size()); }
   bool has_alpha() const { return channels_ == 4; }
+  const TextureRepairs& repairs() const { return repairs_; }
   std::size_t size_bytes() const { return 2 * texels_.size(); }
   std::span<const TextureLevel> levels() const { return levels_; }
   TexelArray texels() const {
@@ -94,6 +105,7 @@ class Texture {
   struct Level;
   void append_level(const Level& level);
 
+  TextureRepairs repairs_;
   std::int32_t channels_ = 0;
   float scale_ = 0;  ///< value of the number 1
   std::vector<TextureLevel> levels_;

@@ -1,3 +1,5 @@
+#include "jobs/cli/farm/events_command.h"
+
 #include <fmt/format.h>
 
 #include <chrono>
@@ -5,7 +7,6 @@
 
 #include "common/base/limits.h"
 #include "jobs/cli/coordinator_link.h"
-#include "jobs/cli/farm/events_command.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/text.h"
 

@@ -40,6 +40,7 @@ Result<std::vector<SlurmPilot>> find_pilots(const std::string& job_name) {
 }
 
 Status SlurmFarm::prepare() const {
+  BATON_TRY(check_log(options_.pilot));
   return write_file_atomic(options_.script, as_bytes_view(pilot_script(options_.pilot)));
 }
 
@@ -132,7 +133,7 @@ void SlurmFarm::submit(int count) {
 void SlurmFarm::warn_of_vain_arrays(const SlurmSnapshot& now) {
   if (!vain_.observe(now) || vain_.count() < kMostVainArrays) return;
   std::string log = options_.pilot.script_log;
-  log.replace(log.find("%A_%a"), 5, vain_.last() + "_1");
+  log.replace(log.rfind("%A_%a"), 5, vain_.last() + "_1");
   spdlog::warn(
       "no pilot of the last {} arrays has reached the coordinator; others are submitted "
       "every {} s; {}",

@@ -28,7 +28,7 @@ class SlurmFarm {
  public:
   explicit SlurmFarm(SlurmFarmOptions options) : options_(std::move(options)) {}
 
-  /// Writes the script. Error: the disk.
+  /// Writes the script. Error: the disk, a folder of logs that Slurm cannot take.
   Status prepare() const;
   /// Looks and gives orders, when it is time to. client: of an admin. Where Slurm or the
   /// coordinator do not answer nothing happens but a warning: they may next time.

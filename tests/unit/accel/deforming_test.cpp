@@ -14,6 +14,7 @@ using test::test_uniforms;
 /// A mesh that says that it deforms; its shapes are made by the tests.
 struct SaidToDeform final : Deformation {
   MeshShape at(double) const override { return {}; }
+  std::array<double, 2> moving_frames() const override { return {}; }
   std::uint64_t size_bytes() const override { return 0; }
 };
 

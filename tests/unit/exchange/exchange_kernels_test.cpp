@@ -54,7 +54,8 @@ TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
       make_material({.kind = MaterialKind::metallic_roughness,
                      .base_color = {1, 0.7f, 0.3f},
                      .metallic = 0.3f,
-                     .roughness = 0.4f}),
+                     .roughness = 0.4f,
+                     .specular = 0.4f}),
       make_measured_material(MeasuredBrdf::tabulate(
           test::phong_by_angles({0.3f, 0.2f, 0.1f}, {0.5f, 0.4f, 0.3f}, 20))),
       make_material({.kind = MaterialKind::metallic_roughness,

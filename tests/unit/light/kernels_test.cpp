@@ -23,6 +23,7 @@ Material material_of(MaterialKind kind) {
   spec.base_color = {0.8f, 0.5f, 0.3f};
   spec.roughness = 0.3f;
   spec.metallic = 0.5f;
+  spec.specular = 0.4f;
   return make_material(spec);
 }
 

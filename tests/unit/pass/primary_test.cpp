@@ -45,6 +45,9 @@ void expect_alike(const SeenSurface& a, const SeenSurface& b) {
   EXPECT_EQ(m.shape, n.shape);
   EXPECT_EQ(m.specular_probability, n.specular_probability);
   EXPECT_EQ(m.f90, n.f90);
+  EXPECT_EQ(m.dielectric_f0, n.dielectric_f0);
+  EXPECT_EQ(m.dielectric_f90, n.dielectric_f90);
+  EXPECT_EQ(m.metallic, n.metallic);
   EXPECT_EQ(m.coat.weight, n.coat.weight);
   EXPECT_EQ(m.coat.alpha, n.coat.alpha);
   EXPECT_EQ(m.coat.normal, n.coat.normal);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/job/motion.h"
 #include "common/scene/gltf/meshes.h"
 #include "common/scene/mesh_loader.h"
 #include "common/scene/object_view.h"
@@ -396,11 +397,9 @@ struct Keyed {
         &left_out);
     EXPECT_TRUE(settled) << (settled ? "" : settled.error().message);
     if (!settled) return;
-    for (const FrameNumber frame : settled->frames) {
-      const std::vector<ObjectKey>& keys = settled->scene.objects.at(0).keys;
-      x.push_back(keys.empty() ? 0
-                               : (*keys.at(static_cast<std::size_t>(frame.value() - 1)).matrix)[3]);
-    }
+    for (const FrameNumber frame : settled->frames)
+      x.push_back(
+          object_motion_at(settled->scene.objects.at(0), KeyCurve::linear, frame.value()).offset.x);
     said = scene_warnings(settled->scene);
     said.insert(said.end(), left_out.begin(), left_out.end());
   }

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "common/job/motion.h"
+#include "common/job/text/frame_range.h"
 #include "common/scene/gltf/node_motion.h"
 #include "common/scene/pose.h"
 #include "common/scene/scene_warnings.h"
@@ -90,7 +92,8 @@ TEST(GltfTime, CamerasCutAndShapesSwitchOnTheirFrame) {
       test::job_of(test::write_test_file("stepped.glb", stepped_glb(24, kRounded)), ""));
   const auto scene = load_scene(job);
   ASSERT_TRUE(scene) << scene.error().message;
-  for (const CameraKey& key : job.camera.keys) EXPECT_EQ(key.position.x, key.frame);
+  for (const CameraKey& key : job.camera.keys)
+    EXPECT_EQ(key.position.x, std::min(key.frame, kFrames - 1.0));
   for (const double frame : {1.0, 3.0}) {
     const Pose pose = pose_at(*scene, job, frame);
     const Instance& low = pose.instances.at(0);
@@ -99,6 +102,77 @@ TEST(GltfTime, CamerasCutAndShapesSwitchOnTheirFrame) {
     EXPECT_EQ(vertices_of(*scene, pose.shapes, low.mesh).positions[1].x, 1 + frame);
   }
   EXPECT_TRUE(pose_at(*scene, job, 2).instances.at(0).is_absent);
+}
+
+/// What frame 5 of a job shows, and the frames beside it: camera, places, first vertices.
+std::vector<Vec3> around_frame_5(const JobSpec& job) {
+  const auto scene = load_scene(job);
+  EXPECT_TRUE(scene) << scene.error().message;
+  std::vector<Vec3> shown;
+  for (int frame = 4; scene && frame <= 6; ++frame) {
+    const Pose pose = pose_at(*scene, job, frame);
+    shown.push_back(camera_at(job, frame).position);
+    for (const Instance& instance : pose.instances) {
+      shown.push_back(instance.to_world.offset);
+      shown.push_back({instance.is_absent ? 0.0f : 1.0f, 0, 0});
+      shown.push_back(vertices_of(*scene, pose.shapes, instance.mesh).positions[1]);
+    }
+  }
+  return shown;
+}
+
+TEST(GltfTime, WhatAFrameShowsDependsOnItsNumberAlone) {
+  // At half the rate node "low" is there in every fourth frame: in 6, not in 4 and 5.
+  const std::string path = test::write_test_file("stepped.glb", stepped_glb(24, kRounded));
+  const auto job_of = [&](const char* frames) {
+    JobSpec job = test::job_of(path, R"(, "fps": 48})");
+    job.scene.objects = {ObjectSpec{.mesh = "m", .material = "d"}};
+    job.scene.meshes["m"] = {.path = path, .mesh = 0};
+    job.scene.materials["d"] = {};
+    job.scene.objects[0].gltf = GltfMotion{.file = path, .node = "top", .fps = 48};
+    job.frames = parse_frames(frames).value();
+    const JobSpec settled = test::settled(job);
+    const auto again = parse_job(to_json(settled), "again", "/");
+    EXPECT_TRUE(again) << again.error().message;
+    return settled;
+  };
+  const JobSpec first = job_of("1-12");
+  const std::vector<Vec3> shown = around_frame_5(first);
+  EXPECT_EQ(shown.at(0), (Vec3{2, 0, 0})) << "frame 4";
+  for (const auto& [frames, same_step] : {std::pair{"5", true},
+                                          {"5-12", true},
+                                          {"1-600", true},
+                                          {"1-9x2", false},
+                                          {"1,5", false},
+                                          {"0,5,9999999", false}}) {
+    const JobSpec job = job_of(frames);
+    EXPECT_EQ(around_frame_5(job), shown) << frames;
+    EXPECT_EQ(job.camera.position, first.camera.position) << frames;
+    // How far samples are followed is measured over the whole animation.
+    if (!same_step) continue;
+    EXPECT_EQ(job.motion.max_px, first.motion.max_px) << frames;
+  }
+}
+
+TEST(GltfTime, AnimationsTooLongForKeysAreTakenAroundTheFrames) {
+  GltfWriter w;
+  w.add(test::kTriangle, "VEC3", 3);
+  w.add(std::vector<float>{0, 1 << 20}, "SCALAR", 1);
+  w.add(std::vector<float>{0, 0, 0, 1 << 20, 0, 0}, "VEC3", 3);
+  const std::string path = test::write_test_file(
+      "long.glb", w.glb(R"("nodes":[{"name":"a","mesh":0,"children":[1]},{"name":"eye","camera":0}],
+               "cameras":[{"type":"perspective","perspective":{"yfov":0.8}}],)" +
+                        test::mesh_json("\"POSITION\":0") +
+                        R"(,"animations":[{"samplers":[{"input":1,"output":2}],
+                "channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}])"));
+  JobSpec job = test::job_of(path, R"(, "fps": 1})");
+  job.frames = parse_frames("2-9999x1000").value();
+  job = test::settled(job);
+  EXPECT_EQ(job.camera.keys.size(), 3 * job.frames.size());
+  for (const int frame : {1, 2, 3, 1001, 1002, 1003}) {
+    EXPECT_EQ(camera_at(job, frame).position.x, frame);
+    EXPECT_EQ(object_motion_at(job.scene.objects.at(0), job.motion.curve, frame).offset.x, frame);
+  }
 }
 
 /// Two curves whose last two keys are at one time.
@@ -126,7 +200,8 @@ TEST(GltfTime, OfKeysAtOneTimeTheLastCounts) {
                      R"(, "camera": {"position": [0, 0, 4], "lookAt": [0, 0, 0]})"),
         &said);
     ASSERT_TRUE(settled) << settled.error().message;
-    EXPECT_EQ((*settled->scene.objects[0].keys[1].matrix)[3], 7) << curve;
+    EXPECT_EQ(object_motion_at(settled->scene.objects[0], KeyCurve::linear, 2).offset.x, 7)
+        << curve;
     EXPECT_THAT(said,
                 testing::Contains(testing::HasSubstr("1 keys of its animations are at the time of "
                                                      "another")))
@@ -189,11 +264,11 @@ TEST(GltfTime, AJobChoosesAmongAnimations) {
     ASSERT_TRUE(settled) << settled.error().message;
     const auto place = [&](std::size_t object) {
       const ObjectSpec& o = settled->scene.objects.at(object);
-      return o.keys.empty() ? *o.matrix : *o.keys.front().matrix;
+      return o.keys.empty() ? to_transform(*o.matrix) : object_motion_at(o, KeyCurve::linear, 1);
     };
-    EXPECT_EQ(place(0)[3], c.x) << c.choice;
-    EXPECT_EQ(place(0)[7], c.y) << c.choice;
-    EXPECT_NEAR(place(1)[0], c.size * c.turned, 1e-6f) << c.choice;
+    EXPECT_EQ(place(0).offset.x, c.x) << c.choice;
+    EXPECT_EQ(place(0).offset.y, c.y) << c.choice;
+    EXPECT_NEAR(place(1).linear.m[0], c.size * c.turned, 1e-6f) << c.choice;
     const auto scene = load_scene(*settled);
     ASSERT_TRUE(scene) << scene.error().message;
     EXPECT_EQ(std::ranges::any_of(scene->instances, &Instance::deforms), c.deforms) << c.choice;
@@ -234,7 +309,7 @@ TEST(GltfTime, CamerasObjectsAndShapesChooseTheirAnimation) {
   job.scene.objects[0].gltf = motion;
   const auto settled = settle_motion(job);
   ASSERT_TRUE(settled) << settled.error().message;
-  EXPECT_EQ((*settled->scene.objects[0].keys[0].matrix)[7], 6);
+  EXPECT_EQ(object_motion_at(settled->scene.objects[0], KeyCurve::linear, 1).offset.y, 6);
   const auto scene = load_scene(*settled);
   ASSERT_TRUE(scene) << scene.error().message;
   const auto first_vertex = [&](const Scene& s, const JobSpec& j) {

@@ -284,6 +284,24 @@ TEST(Adoption, AKeyChangesTheFramesThatItMoves) {
   EXPECT_EQ(comparison.difference(FrameIndex(5), FrameIndex(5)), "$.camera.keys at frame 6");
 }
 
+// Vectors of motion lead to the frame behind, and are seen only where both jobs have them.
+TEST(Adoption, AKeyChangesTheMotionOfTheFrameBefore) {
+  JobSpec job = moving_job(2, 8, 3);
+  job.motion.curve = KeyCurve::linear;
+  job.scene.objects = {{.mesh = "m", .material = "m"}};
+  job.scene.objects[0].keys = {{.frame = 1}, {.frame = 6}, {.frame = 7}};
+  JobSpec other = job;
+  other.scene.objects[0].keys[2].translate.x = 1;
+  const auto num_common = [&] {
+    return FrameComparison(document_of(job), document_of(other)).num_common_steps();
+  };
+  EXPECT_EQ(num_common(), 6);
+  job.output.aovs = {Aov::motion};
+  EXPECT_EQ(num_common(), 6);
+  other.output.aovs = {Aov::motion};
+  EXPECT_EQ(num_common(), 5);
+}
+
 TEST(Adoption, ACarriedHistoryBeginsWithTheFirstFrame) {
   const JobSpec job = small_job(1, 8, 2);
   EXPECT_NE(document_of(job).picture, document_of(with_frames(job, 2, 8)).picture);

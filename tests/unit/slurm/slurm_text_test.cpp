@@ -63,6 +63,13 @@ TEST(SlurmText, SbatchGetsOneNodeForEachPilot) {
                            "--partition=cpu", "--time=2:00:00", "--signal=B:TERM@60"})
     EXPECT_THAT(command, Contains(word));
   EXPECT_EQ(command[command.size() - 2], "--account=film");
+  // Nothing of a folder's name is a pattern.
+  job.script_log = "/50% of %j/%A_%a.log";
+  EXPECT_THAT(sbatch_command(job, 1, "x"), Contains("--output=/50%% of %%j/%A_%a.log"));
+  EXPECT_TRUE(check_log(job));
+  job.script_log = "/back\\slash/%A_%a.log";
+  EXPECT_THAT(check_log(job).error().message,
+              HasSubstr("/back\\slash: expected a folder without a backslash"));
   EXPECT_EQ(command.back(), "/farm/pilot.sh");
   job.time_s = 60;
   EXPECT_THAT(sbatch_command(job, 1, "x"), Not(Contains("--signal=B:TERM@60")));

@@ -224,6 +224,48 @@ TEST(Material, GgxNeverReflectsMoreThanItReceives) {
   }
 }
 
+// glTF 2.0, appendix B.2: mix(dielectric, metal, metallic), of what they reflect.
+TEST(Material, BetweenMetalAndNotIsTheMixOfBoth) {
+  MaterialSpec spec;
+  spec.kind = MaterialKind::metallic_roughness;
+  for (const float specular : {1.0f, 0.4f, 0.0f}) {
+    spec.specular = specular;
+    spec.ior = specular < 1 ? 2.0f : 1.5f;
+    for (const float roughness : {0.1f, 0.3f, 0.8f}) {
+      const auto of = [&](float metallic) {
+        return make_material(spec, {1, 0.7f, 0.1f}, metallic, roughness);
+      };
+      for (const double view : {10.0, 60.0, 85.0, 89.0}) {
+        const ShadingPoint point = flat_point(view);
+        for (std::uint32_t i = 0; i < 200; ++i) {
+          const auto u = test::test_uniforms(5, i);
+          const Vec3 wi = sample_bsdf(of(0.5f), point, {u[0], u[1], u[2]});
+          const Rgb plain = evaluate_bsdf(of(0), point, wi),
+                    metal = evaluate_bsdf(of(1), point, wi);
+          for (const float m : {0.01f, 0.3f, 0.5f, 0.9f, 0.999f}) {
+            const Rgb got = evaluate_bsdf(of(m), point, wi), mix = plain * (1 - m) + metal * m;
+            ASSERT_NEAR(got.x, mix.x, 1e-5f + 1e-4f * mix.x) << m << " under " << view;
+            ASSERT_NEAR(got.z, mix.z, 1e-5f + 1e-4f * mix.z) << m << " under " << view;
+          }
+        }
+      }
+    }
+  }
+}
+
+// White under a white sky is the mean of white varnish, which reflects all, and of white metal.
+TEST(Material, HalfAMetalReflectsHalfAsMuchLessAsAMetal) {
+  for (const float roughness : {0.05f, 0.3f, 0.6f}) {
+    for (const double view : {0.0, 45.0, 75.0}) {
+      const auto at = [&](float m) { return albedo(ggx(m, roughness), flat_point(view)); };
+      const auto [plain, e0] = at(0);
+      const auto [half, e1] = at(0.5f);
+      const auto [metal, e2] = at(1);
+      EXPECT_NEAR(half, (plain + metal) / 2, 5 * (e0 + e1 + e2) + 1e-3) << roughness << " " << view;
+    }
+  }
+}
+
 // KHR_materials_specular: without a lobe the diffuse part gives nothing away.
 TEST(Material, GgxWithoutSpecularIsLambertian) {
   MaterialSpec spec;
@@ -241,8 +283,12 @@ TEST(Material, BrdfIsReciprocal) {
   const Vec3 b = from_polar(65, 200);
   const ShadingPoint from_a{.position = {}, .ng = {0, 0, 1}, .ns = {0, 0, 1}, .wo = a};
   const ShadingPoint from_b{.position = {}, .ng = {0, 0, 1}, .ns = {0, 0, 1}, .wo = b};
-  for (const Material& m :
-       {make_material({}), phong(0.3f, 0.6f, 5), ggx(0.3f, 0.5f), ggx(1, 0.9f)}) {
+  // Grey, of which diffuse_left takes nothing: what it takes of white goes by the viewer alone.
+  const Material grey = make_material({.kind = MaterialKind::metallic_roughness,
+                                       .base_color = {0.7f, 0.7f, 0.7f},
+                                       .metallic = 0.3f,
+                                       .roughness = 0.5f});
+  for (const Material& m : {make_material({}), phong(0.3f, 0.6f, 5), grey, ggx(1, 0.9f)}) {
     EXPECT_NEAR(evaluate_bsdf(m, from_a, b).x, evaluate_bsdf(m, from_b, a).x, 1e-6f);
   }
 }

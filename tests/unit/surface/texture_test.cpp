@@ -82,6 +82,25 @@ TEST(Texture, ColoursBecomeLinearBeforeTheyAreAveraged) {
   EXPECT_NEAR(linear->texel(0, 1, 0)[1], 0.5f, 1e-3f);
 }
 
+TEST(Texture, WhatItCannotHoldIsCountedByTexels) {
+  Image image = image_of(3, 2, 4, std::vector<float>(24, 0.5f));
+  EXPECT_THAT(repair_notes(texture_of(image, TextureUse::color)->repairs()), testing::IsEmpty());
+  image.is_integer = false;
+  image.samples[0] = NAN;
+  image.samples[1] = -1;  // of the same texel
+  image.samples[5] = INFINITY;
+  image.samples[8] = 1e6f;
+  image.samples[15] = -INFINITY;  // alpha
+  const auto color = texture_of(image, TextureUse::color);
+  EXPECT_EQ(color->texel(0, 1, 0)[1], 0) << "as in maps";
+  EXPECT_NEAR(color->texel(0, 2, 0)[0], 65504, 1);
+  EXPECT_THAT(repair_notes(color->repairs()),
+              testing::ElementsAre("2 texels are negative, NaN or infinite and count as 0",
+                                   "1 texels are brighter than 65504 and cut"));
+  EXPECT_EQ(texture_of(image, TextureUse::color_and_alpha)->repairs().unusable, 3u);
+  EXPECT_EQ(texture_of(image, TextureUse::green)->repairs().unusable, 2u);
+}
+
 TEST(Texture, ChannelsGoWhereTheirUseSays) {
   const Image rgba = image_of(1, 1, 4, {0.1f, 0.2f, 0.3f, 0.4f});
   const auto pair = texture_of(rgba, TextureUse::metallic_roughness)->texel(0, 0, 0);
