@@ -203,6 +203,8 @@ class FaceTaker {
     mesh.repairs.lines = polygons_.lines;
     mesh.repairs.colors = polygons_.bad_colors;
     mesh.repairs.unread_colors = polygons_.unread_colors;
+    mesh.repairs.formulas = polygons_.formulas;
+    mesh.repairs.unread_lines = polygons_.unread_lines;
     return mesh;
   }
 

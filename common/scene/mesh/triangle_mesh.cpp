@@ -34,6 +34,9 @@ std::span<const RepairKind> repair_kinds() {
        "vertices have colours that are not from 0 to 1: they are cut, or white"},
       {&MeshRepairs::unread_colors,
        "vertices or faces have colours in a form that is not read: they count as white"},
+      {&MeshRepairs::formulas, "curves or surfaces of formulas are not shown"},
+      {&MeshRepairs::unread_lines,
+       "lines begin with a word that is not known, or call another file: they are left out"},
   };
   static_assert(sizeof(MeshRepairs) == std::size(kKinds) * sizeof(std::uint64_t));
   return kKinds;
