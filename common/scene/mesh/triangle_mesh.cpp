@@ -37,6 +37,8 @@ std::span<const RepairKind> repair_kinds() {
       {&MeshRepairs::formulas, "curves or surfaces of formulas are not shown"},
       {&MeshRepairs::unread_lines,
        "lines begin with a word that is not known, or call another file: they are left out"},
+      {&MeshRepairs::spare_indices, "indices at the end of lists of triangles make none"},
+      {&MeshRepairs::shrunk, "parts are shrunk to nothing by their bones or morph weights"},
   };
   static_assert(sizeof(MeshRepairs) == std::size(kKinds) * sizeof(std::uint64_t));
   return kKinds;
