@@ -9,9 +9,6 @@
 namespace baton {
 namespace {
 
-/// "diffuse." of "diffuse.R".
-std::string layer_of(const std::string& name) { return name.substr(0, name.rfind('.') + 1); }
-
 std::string lower(std::string text) {
   std::ranges::transform(text, text.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -19,10 +16,37 @@ std::string lower(std::string text) {
   return text;
 }
 
+/// Names of red, green, blue and alpha.
+constexpr std::array<std::array<std::string_view, 2>, 4> kColorNames{
+    {{"r", "red"}, {"g", "green"}, {"b", "blue"}, {"a", "alpha"}}};
+
+/// Index into kColorNames of a name in lower case; their number: none of them.
+std::size_t color_index(std::string_view name) {
+  const auto* const found = std::ranges::find_if(kColorNames, [&](const auto& names) {
+    return std::ranges::find(names, name) != names.end();
+  });
+  return static_cast<std::size_t>(found - kColorNames.begin());
+}
+
+/// "diffuse." of "diffuse.R"; of a name without a dot "diffuse_" of "diffuse_R", or "diffuse" of
+/// "diffuseR", where what follows is a colour.
+std::string layer_of(const std::string& name) {
+  if (const std::size_t dot = name.rfind('.'); dot != name.npos) return name.substr(0, dot + 1);
+  if (const std::size_t mark = name.find_last_of("_-:/ "); mark != name.npos)
+    return color_index(lower(name.substr(mark + 1))) < kColorNames.size() ? name.substr(0, mark + 1)
+                                                                          : std::string();
+  const std::size_t last = name.find_last_of("ABGR");
+  const char before = last != name.npos && last > 0 ? name[last - 1] : 'A';
+  const bool begins_word = !(before >= 'A' && before <= 'Z');
+  return begins_word && color_index(lower(name.substr(last))) < kColorNames.size()
+             ? name.substr(0, last)
+             : std::string();
+}
+
 /// A layer of a part, by what its channels are called.
 struct Layer {
   std::size_t part = 0;
-  std::string name{};  ///< with its dot, or empty
+  std::string name{};  ///< with what divides it from the channel's, or empty
   std::array<std::string, 3> rgb{};
   std::string x{}, y{}, ry{}, by{}, alpha{};
 
@@ -32,15 +56,24 @@ struct Layer {
   /// Y beside X is a coordinate.
   bool has_luminance() const { return !y.empty() && x.empty(); }
   bool is_luma_chroma() const { return has_luminance() && !ry.empty() && !by.empty(); }
-  bool has_colors() const { return num_colors() > 0 || has_luminance(); }
+  /// One without a dot has all three: by chance a name ends as that of a colour does.
+  bool has_colors() const {
+    if (!name.empty() && !name.ends_with('.')) return num_colors() == 3;
+    return num_colors() > 0 || has_luminance();
+  }
+  /// Its name as people say it.
+  std::string title() const {
+    const bool is_marked =
+        !name.empty() && std::string_view("._-:/ ").find(name.back()) != name.npos;
+    return is_marked ? name.substr(0, name.size() - 1) : name;
+  }
 };
 
 void take(const std::string& channel, Layer& layer) {
   const std::string last = lower(channel.substr(layer.name.size()));
-  if (last == "r" || last == "red") layer.rgb[0] = channel;
-  if (last == "g" || last == "green") layer.rgb[1] = channel;
-  if (last == "b" || last == "blue") layer.rgb[2] = channel;
-  if (last == "a" || last == "alpha") layer.alpha = channel;
+  const std::size_t color = color_index(last);
+  if (color < 3) layer.rgb.at(color) = channel;
+  if (color == 3) layer.alpha = channel;
   if (last == "x") layer.x = channel;
   if (last == "y") layer.y = channel;
   if (last == "ry") layer.ry = channel;
@@ -66,16 +99,26 @@ std::vector<Layer> layers_of(const std::vector<PartLayout>& parts) {
   return layers;
 }
 
+/// 0: the name of a whole picture; 1: has one in it; 2: another.
+int beauty_rank(const std::string& given) {
+  const std::string name = lower(given);
+  int best = 2;
+  for (const std::string_view word : {"beauty", "combined", "rgb", "rgba"}) {
+    if (name == word) return 0;
+    if (name.find(word) != name.npos) best = 1;
+  }
+  return best;
+}
+
 /// The less the better.
-auto rank(const Layer& layer) {
-  const std::string name = lower(layer.name);
-  const auto is_called = [&](const char* word) { return name.find(word) != name.npos; };
-  const bool is_beauty = is_called("beauty") || is_called("combined") || is_called("rgb");
-  return std::tuple(layer.num_colors() < 3 && !layer.is_luma_chroma(), !name.empty(), !is_beauty);
+auto rank(const Layer& layer, const std::vector<PartLayout>& parts) {
+  return std::tuple(layer.num_colors() < 3 && !layer.is_luma_chroma(),
+                    beauty_rank(parts[layer.part].name), !layer.name.empty(),
+                    beauty_rank(layer.title()));
 }
 
 std::string title(const Layer& layer, const std::vector<PartLayout>& parts) {
-  const std::string name = layer.name.empty() ? "" : layer.name.substr(0, layer.name.size() - 1);
+  const std::string name = layer.title();
   if (parts.size() == 1) return name.empty() ? "R, G, B" : fmt::format("layer \"{}\"", name);
   const std::string& part = parts[layer.part].name;
   return fmt::format("part {}{}{}", layer.part + 1,
@@ -100,7 +143,7 @@ std::optional<ColorChoice> choose_colors(const std::vector<PartLayout>& parts) {
     return has_one ? std::optional(any_channels(parts)) : std::nullopt;
   }
   const Layer& layer = *std::ranges::min_element(
-      layers, [](const Layer& a, const Layer& b) { return rank(a) < rank(b); });
+      layers, [&](const Layer& a, const Layer& b) { return rank(a, parts) < rank(b, parts); });
   ColorChoice choice{.part = layer.part, .colors = {}, .alpha = layer.alpha, .notes = {}};
   if (layer.num_colors() == 0) {
     choice.is_luma_chroma = layer.is_luma_chroma();

@@ -27,11 +27,12 @@ struct ColorChoice {
 
 /// The rule for all readers. A layer is the channels of a part with one prefix ("diffuse." of
 /// "diffuse.R"). It has colours if it has some of R, G, B, or Red, Green, Blue, in either case, or
-/// luminance Y, with RY and BY or alone; its alpha is A or Alpha. Of several layers those with
-/// three colours come first, among them those without a name, then those with beauty, combined or
-/// rgb in their name, then the first in the file. Layers beside the plain one of their part are
-/// passes, of which nothing is noted. Where none has colours: the only channel, as grey; nullopt:
-/// there are several.
+/// luminance Y, with RY and BY or alone; its alpha is A or Alpha. Without a dot all three colours
+/// of "diffuse_R" or "diffuseR" are a layer, too. Of several layers those with three colours come
+/// first, among them those of a part called beauty, combined, rgb or rgba, then of one with such a
+/// word in its name; in a part the layer without a name, then by the same words, then the first in
+/// the file. Layers beside the plain one of their part are passes, of which nothing is noted. Where
+/// none has colours: the only channel, as grey; nullopt: there are several.
 std::optional<ColorChoice> choose_colors(const std::vector<PartLayout>& parts);
 
 /// Where no layer has colours: the first three channels of the first part, or the first as grey.

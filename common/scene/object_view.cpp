@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <span>
 #include <utility>
@@ -29,6 +31,12 @@ BoxCorners corners_of(std::span<const Vec3> points) {
   return corners;
 }
 
+/// How far apart floats are at the largest coordinate of a place.
+float float_spacing(const Vec3& place) {
+  const float largest = std::max({std::fabs(place.x), std::fabs(place.y), std::fabs(place.z)});
+  return std::nextafter(largest, std::numeric_limits<float>::max()) - largest;
+}
+
 /// What a camera's picture has of a box.
 enum class Sight { behind, outside, tiny, seen };
 
@@ -48,6 +56,20 @@ class View {
       const bool is_inward = dot(normal, (ahead.origin - a.origin) + ahead.direction) >= 0;
       planes_[i + 1] = {a.origin, is_inward ? normal : normal * -1.0f};
     }
+  }
+
+  /// How far apart floats are where a box comes nearest to the eye, in pixels there. An eye within
+  /// sees it from a share of its size.
+  float spacing_in_pixels(const BoxCorners& box) const {
+    constexpr float kNearestShare = 1.0f / 64;
+    const Vec3 eye = camera_.plane().eye;
+    Bounds bounds;
+    for (const Vec3& corner : box) bounds.add(corner);
+    const Vec3 nearest{std::clamp(eye.x, bounds.low.x, bounds.high.x),
+                       std::clamp(eye.y, bounds.low.y, bounds.high.y),
+                       std::clamp(eye.z, bounds.low.z, bounds.high.z)};
+    const float distance = std::max(length(nearest - eye), kNearestShare * length(bounds.size()));
+    return float_spacing(nearest) / camera_.pixel_width(camera_.plane().forward, distance);
   }
 
   Sight sight(const BoxCorners& box) const {
@@ -122,22 +144,49 @@ void warn_of_repairs(const JobSpec& job, const Scene& scene, std::vector<std::st
   }
 }
 
+/// What the best frame shows of an instance.
+struct Shown {
+  Sight best = Sight::behind;
+  /// View::spacing_in_pixels, the most of the frames that show it, and the place there.
+  float spacing_px = 0;
+  Vec3 place{};
+};
+
+/// Objects whose places floats round to more than a small share of a pixel.
+void warn_of_coarse_places(const JobSpec& job, const std::vector<Shown>& shown,
+                           std::vector<std::string>& warnings) {
+  constexpr float kMostPixels = 0.125f;
+  for (std::size_t i = 0; i < std::min(shown.size(), job.scene.objects.size()); ++i) {
+    if (!(shown[i].spacing_px > kMostPixels)) continue;
+    warnings.push_back(fmt::format(
+        "object {} ({}) is so far from the origin, {:.3g} units, that its places are rounded to "
+        "{:.2g} units, {:.2g} pixels: bring it and the camera nearer, by `center` or `translate`",
+        i, label_of(job.scene.objects[i]), length(shown[i].place), float_spacing(shown[i].place),
+        shown[i].spacing_px));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scene) {
   std::vector<BoxCorners> boxes;
   for (const TriangleMesh& mesh : scene.meshes) boxes.push_back(corners_of(mesh.positions));
-  std::vector<Sight> best(scene.instances.size(), Sight::behind);
+  std::vector<Shown> shown(scene.instances.size());
   for (const FrameNumber frame : pick_frames(job.frames, kMostFrames)) {
     const Pose pose = pose_at(scene, job, frame.value());
     const View view(pose.camera, job.image);
-    for (std::size_t i = 0; i < best.size(); ++i) {
+    for (std::size_t i = 0; i < shown.size(); ++i) {
       const std::uint32_t mesh = pose.instances[i].mesh;
       BoxCorners box = pose.instances[i].deforms
                            ? corners_of(vertices_of(scene, pose.shapes, mesh).positions)
                            : boxes[mesh];
       for (Vec3& corner : box) corner = pose.instances[i].to_world.point(corner);
-      best[i] = std::max(best[i], view.sight(box));
+      const Sight sight = view.sight(box);
+      shown[i].best = std::max(shown[i].best, sight);
+      const float spacing_px = sight == Sight::seen ? view.spacing_in_pixels(box) : 0;
+      if (!(spacing_px > shown[i].spacing_px)) continue;
+      shown[i].spacing_px = spacing_px;
+      shown[i].place = box[0];
     }
   }
 
@@ -148,12 +197,14 @@ std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scen
   for (const Material& material : scene.materials) {
     if (material.detail != nullptr) append(material.detail->notes, warnings);
   }
-  for (std::size_t i = 0; i < std::min(best.size(), job.scene.objects.size()); ++i) {
-    if (best[i] != Sight::seen)
-      warnings.push_back(
-          fmt::format("object {} ({}) {}", i, label_of(job.scene.objects[i]), words(best[i])));
+  for (std::size_t i = 0; i < std::min(shown.size(), job.scene.objects.size()); ++i) {
+    if (shown[i].best != Sight::seen)
+      warnings.push_back(fmt::format("object {} ({}) {}", i, label_of(job.scene.objects[i]),
+                                     words(shown[i].best)));
   }
-  const bool nothing = std::ranges::none_of(best, [](Sight s) { return s >= Sight::tiny; });
+  warn_of_coarse_places(job, shown, warnings);
+  const bool nothing =
+      std::ranges::none_of(shown, [](const Shown& s) { return s.best >= Sight::tiny; });
   if (nothing) warnings.push_back("the camera sees no object and no ground in any frame");
   return warnings;
 }

@@ -24,7 +24,7 @@ struct BarParts {
   std::vector<float> weight_values{0, 1};
   std::string curve = "LINEAR";
   bool skinned = true, morphed = false, animated = true;
-  std::string more_attributes = "", mesh_more = "", node_more = "", more = "";
+  std::string more_attributes = "", mesh_more = "", node_more = "", root_more = "", more = "";
 };
 
 /// Nodes: 0 shows the bar, far aside, 1 and 2 are its bones, 2 at (1, 0, 0) below 1. Within a
@@ -46,7 +46,8 @@ inline std::string bar_glb(const BarParts& parts) {
   std::string json = R"("scenes":[{"nodes":[0,1]}],"nodes":[
       {"name":"bar","mesh":0,"translation":[0,0,100])" +
                      std::string(parts.skinned ? R"(,"skin":0)" : "") + parts.node_more + R"(},
-      {"name":"root","children":[2]},{"name":"tip","translation":[1,0,0]}],
+      {"name":"root","children":[2])" +
+                     parts.root_more + R"(},{"name":"tip","translation":[1,0,0]}],
     "meshes":[{"primitives":[{"attributes":{)" +
                      attributes + "}" +
                      (parts.morphed ? R"(,"targets":[{"POSITION":5,"NORMAL":6}])" : "") + "}]" +

@@ -82,10 +82,13 @@ struct ShadowRays {
 };
 
 /// How far origins of shadow rays are lifted off a surface: coordinates below kLiftOrigin by a
-/// distance, others by a number of float steps.
+/// distance, others by a number of float steps, but at least by what is rounded along the normal.
 struct Lift {
   float near = 1.0f / 65536;
   float steps = 256;
+  /// Rounding of rays that the ray tracer takes to the space of the mesh, along each axis of the
+  /// world; 0 where the mesh lies in the world.
+  Vec3 of_rays{};
 
   bool operator==(const Lift&) const = default;
 };
@@ -94,8 +97,18 @@ inline constexpr float kLiftOrigin = 1.0f / 32;
 /// beside it, or beside the float spacing where they are, a smaller one: the distance is at most
 /// 2^-14 of the largest coordinate, the steps at most 2^-10 of the size, and 16 or more.
 Lift lift_of(const Bounds& bounds);
+/// Lift::of_rays of a mesh that lies in a space of its own, with `bounds` in the world.
+Vec3 rounding_of_rays(const Instance& instance, const Bounds& bounds);
+/// Rounding of a position between the corners of a triangle, as a share of the mean of their
+/// coordinates without signs [Pharr, Jakob & Humphreys 2023, section 6.8].
+inline constexpr float kPositionError = 0x1p-21f;
 /// The origin of a shadow ray: `position` lifted along the geometric normal just so far that float
-/// error cannot make the surface shadow itself [Waechter & Binder 2019].
+/// error cannot make the surface shadow itself: coordinate by coordinate [Waechter & Binder 2019],
+/// and where that is less, as off planes along an axis whose coordinate is large, by the error of
+/// all coordinates along the normal. extent: the mean of the triangle's corners there, without
+/// signs.
+Vec3 lift_off(const Vec3& position, const Vec3& extent, const Vec3& ng, const Lift& lift);
+/// The same on a small triangle.
 Vec3 lift_off(const Vec3& position, const Vec3& ng, const Lift& lift = {});
 
 /// How a ray tracer is built.

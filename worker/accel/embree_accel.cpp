@@ -87,7 +87,10 @@ class EmbreeAccel final : public Accel {
     for (const Instance& instance : instances) {
       const std::span<const Vec3> points =
           instance.deforms ? vertices_[instance.mesh].positions : geometry_->boxes[instance.mesh];
-      lifts_.push_back(lift_of(box_around(points, instance.to_world)));
+      const Bounds bounds = box_around(points, instance.to_world);
+      lifts_.push_back(lift_of(bounds));
+      const bool lies_apart = !instance.deforms && geometry_->own_meshes.contains(instance.mesh);
+      if (lies_apart) lifts_.back().of_rays = rounding_of_rays(instance, bounds);
     }
   }
 

@@ -35,6 +35,21 @@ HWY_INLINE VF Lifted(VF position, VF normal, const Lift& lift) {
   return hn::IfThenElse(hn::Lt(hn::Abs(position), hn::Set(d, kLiftOrigin)), near, far);
 }
 
+HWY_INLINE Vec3Lanes Magnitude(const Vec3Lanes& v) {
+  return {hn::Abs(v.x), hn::Abs(v.y), hn::Abs(v.z)};
+}
+/// lift_off().
+HWY_INLINE Vec3Lanes LiftedOff(const Vec3Lanes& position, const Vec3Lanes& extent,
+                               const Vec3Lanes& ng, const Lift& lift) {
+  const DF d;
+  const Vec3Lanes near{Lifted(position.x, ng.x, lift), Lifted(position.y, ng.y, lift),
+                       Lifted(position.z, ng.z, lift)};
+  const Vec3Lanes error = Add(Scale(extent, hn::Set(d, kPositionError)), SetLanes(lift.of_rays));
+  const VF least = ExactDot(error, Magnitude(ng));
+  const VF missing = hn::Sub(least, ExactDot(Sub(near, position), ng));
+  return Add(near, Scale(ng, hn::Max(missing, hn::Zero(d))));
+}
+
 /// What three corners have, at the places that rays meet.
 struct CornerWeights {
   VF a, b, c;
@@ -122,8 +137,8 @@ void SeeSurfaces(const kernels::MetTriangles& met, std::size_t first, const Inst
       ns = TurnedTo(ng, ExactNormalize(ExactTimes(instance.normal_to_world, normal)));
       ns = Select(hn::Gt(ExactDot(ns, ng), hn::Zero(d)), ns, ng);
     }
-    const Vec3Lanes origin{Lifted(position.x, ng.x, lift), Lifted(position.y, ng.y, lift),
-                           Lifted(position.z, ng.z, lift)};
+    const Vec3Lanes extent = weights.mean(Magnitude(a), Magnitude(b), Magnitude(c));
+    const Vec3Lanes origin = LiftedOff(position, extent, ng, lift);
 
     // Write them as records.
     HitsOfLanes out;

@@ -23,6 +23,26 @@ struct TexelList {
   alignas(16) std::array<float, kMost> weight;
 };
 
+/// How coordinates go on along one axis of a footprint. A clamped image ends where its edge does: a
+/// footprint whose middle is within it is folded at the edge, and has as much of the edge as the
+/// image has; one whose middle is beyond has nothing else. So surfaces that end with the image and
+/// those that go on have the right mean of all sites.
+struct AxisWrap {
+  bool is_below, is_beyond;  ///< all of it lies in the border
+  int periods;               ///< images until it repeats; 0: never
+
+  AxisWrap(Wrap wrap, float middle)
+      : is_below(wrap == Wrap::clamp && middle < 0),
+        is_beyond(wrap == Wrap::clamp && middle > 1),
+        periods(is_below || is_beyond  ? 0
+                : wrap == Wrap::repeat ? 1
+                                       : 2) {}
+
+  /// Of `size` texels the first and the last that count.
+  int low(int size) const { return is_below ? -1 : is_beyond ? size : 0; }
+  int high(int size) const { return is_below ? -1 : is_beyond ? size : size - 1; }
+};
+
 /// How coordinates go on past the edges: lanes of fine u, fine v, coarse u, coarse v.
 struct WrapLanes {
   VF4 size;        ///< texels
@@ -31,7 +51,7 @@ struct WrapLanes {
   VI4 texels;      ///< texels of a period, or 0
   /// The sum of two texels that mirror each other, or large.
   VI4 mirror;
-  /// The first and the last texel, or those of the border.
+  /// The first and the last texel, or twice one of the border.
   VI4 low, high;
 
   WrapLanes(const ProbeLine& line, const TextureSampling& sampling) {
@@ -43,24 +63,21 @@ struct WrapLanes {
     const DI4 di;
     const VI4 width =
         lanes(di, line.fine.width, line.fine.height, line.coarse.width, line.coarse.height);
-    const auto of = [&](Wrap wrap) {
-      return wrap == Wrap::repeat ? 1 : wrap == Wrap::mirror ? 2 : 0;
-    };
-    const int border_u = sampling.wrap_u == Wrap::clamp ? 1 : 0;
-    const int border_v = sampling.wrap_v == Wrap::clamp ? 1 : 0;
-    const VI4 border = lanes(di, border_u, border_v, border_u, border_v);
-    const int u = of(sampling.wrap_u), v = of(sampling.wrap_v);
-    const VI4 periods = lanes(di, u, v, u, v);
+    const AxisWrap u(sampling.wrap_u, line.middle[0]), v(sampling.wrap_v, line.middle[1]);
+    const VI4 periods = lanes(di, u.periods, v.periods, u.periods, v.periods);
     const auto inverse = [](int p) { return p == 0 ? 0.0f : 1.0f / static_cast<float>(p); };
     size = hn::ConvertTo(d, width);
     period = hn::ConvertTo(d, periods);
-    per_period = lanes(d, inverse(u), inverse(v), inverse(u), inverse(v));
+    const float per_u = inverse(u.periods), per_v = inverse(v.periods);
+    per_period = lanes(d, per_u, per_v, per_u, per_v);
     texels = hn::Mul(width, periods);
-    const VI4 one = hn::Set(di, 1), last = hn::Sub(width, one);
+    low = lanes(di, u.low(line.fine.width), v.low(line.fine.height), u.low(line.coarse.width),
+                v.low(line.coarse.height));
+    high = lanes(di, u.high(line.fine.width), v.high(line.fine.height), u.high(line.coarse.width),
+                 v.high(line.coarse.height));
     const auto clamped = hn::Eq(periods, hn::Zero(di));
-    low = hn::Neg(border);
-    high = hn::Add(last, border);
-    mirror = hn::IfThenElse(clamped, hn::Set(di, 1 << 20), hn::Add(width, last));
+    const VI4 twice = hn::Sub(hn::Add(width, width), hn::Set(di, 1));
+    mirror = hn::IfThenElse(clamped, hn::Set(di, 1 << 20), twice);
   }
 
   /// Within one period of the image, or at most one image away from it; what is not finite is 0.

@@ -52,6 +52,8 @@ void check_version(const JsonView& root) {
   if (!asset) root.fail("expected asset.version 2.x, got nothing");
   if (const std::string version = asset.text("version"); asset && !version.starts_with("2."))
     asset.fail("expected version 2.x, got \"" + version + "\"");
+  if (const std::string least = asset.text("minVersion"); !least.empty() && least != "2.0")
+    asset.fail("expected minVersion 2.0, got \"" + least + "\"");
 }
 
 Bytes copy_of(ByteView bytes) { return {bytes.begin(), bytes.end()}; }

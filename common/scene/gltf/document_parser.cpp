@@ -1,6 +1,7 @@
 #include "common/scene/gltf/document_parser.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -245,9 +246,12 @@ void parse_animation(const JsonView& animation, Document& document) {
     Interpolation interpolation;
   };
   std::vector<Sampler> samplers;
+  std::set<std::string> unknown;
   const std::size_t num_accessors = document.accessors.size();
   animation.each("samplers", [&](const JsonView& sampler) {
     const std::string curve = sampler.text("interpolation");
+    if (!curve.empty() && curve != "LINEAR" && curve != "STEP" && curve != "CUBICSPLINE")
+      unknown.insert(curve);
     samplers.push_back({sampler.required_index("input", num_accessors),
                         sampler.required_index("output", num_accessors),
                         curve == "STEP"          ? Interpolation::step
@@ -270,6 +274,10 @@ void parse_animation(const JsonView& animation, Document& document) {
     if (path == "scale") add(Path::scale);
     if (path == "weights") add(Path::weights);
   });
+  if (!unknown.empty())
+    document.notes.push_back(
+        fmt::format("{}: interpolations {} are not known: they count as LINEAR", animation.place(),
+                    fmt::join(unknown, ", ")));
   document.animations.push_back(animation.name("name"));
 }
 
@@ -294,14 +302,19 @@ void parse_lists(const JsonView& root, Document& document) {
   });
   root.each("cameras",
             [&](const JsonView& camera) { document.cameras.push_back(parse_camera(camera)); });
+  std::size_t unturned = 0;
   const NodeLimits limits{count_of(root, "nodes"), document.meshes.size(), document.cameras.size(),
                           count_of(root, "skins"), document.accessors.size()};
   root.each("nodes", [&](const JsonView& node) {
     document.nodes.push_back(parse_node(node, limits));
     Node& read = document.nodes.back();
+    unturned += read.rotation == std::array<double, 4>{} ? 1 : 0;
     fit_weights(node, read.mesh < 0 ? 0 : document.mesh_of(read).num_targets(), read.weights,
                 document.notes);
   });
+  if (unturned > 0)
+    document.notes.push_back(
+        fmt::format("{} nodes have a rotation of zeros: they are not turned", unturned));
   root.each("skins", [&](const JsonView& skin) {
     document.skins.push_back(parse_skin(skin, document.accessors.size(), limits.nodes));
   });

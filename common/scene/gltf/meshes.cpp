@@ -79,13 +79,12 @@ Error without_triangles(const Document& document, const MeshSpec& spec, std::uin
                                     dropped));
 }
 
-Result<TriangleMesh> built_mesh(const Document& document, const MeshSpec& spec,
-                                const Opened& opened) {
+/// May have no triangles.
+TriangleMesh built_mesh(const Opened& opened) {
   MeshBuilder builder(opened.parts);
   add_triangles(opened.vertices, kIdentity, opened.parts, builder);
   TriangleMesh result = builder.take();
   result.repairs = used_repairs(opened);
-  if (result.triangles.empty()) return without_triangles(document, spec, result.dropped_triangles);
   return result;
 }
 
@@ -128,9 +127,10 @@ class AnimatedShape final : public Deformation {
   const Shaper shaper_;
 };
 
-/// Vertices and triangles as the file lists them: those that are alike at rest may part.
-Result<TriangleMesh> deforming_mesh(const Document& document, const MeshSpec& spec, Opened opened,
-                                    std::shared_ptr<const Deformation> deformation) {
+/// Vertices and triangles as the file lists them, in a shape: those that are alike in it may part
+/// in another.
+Result<TriangleMesh> listed_mesh(const Document& document, const MeshSpec& spec, Opened opened,
+                                 MeshShape shape) {
   TriangleMesh mesh;
   const std::vector<std::uint32_t>& corners = opened.vertices.corners;
   for (std::size_t i = 0; i < corners.size(); i += 3) {
@@ -148,11 +148,9 @@ Result<TriangleMesh> deforming_mesh(const Document& document, const MeshSpec& sp
       mesh.uvs[set].push_back({opened.vertices.uvs[set][i], opened.vertices.uvs[set][i + 1]});
   }
   mesh.colors = std::move(opened.vertices.colors);
-  MeshShape first = deformation->at(spec.shaped_by->animation->start_frame);
-  mesh.positions = std::move(first.positions);
-  mesh.normals = std::move(first.normals);
-  mesh.tangents = std::move(first.tangents);
-  mesh.deformation = std::move(deformation);
+  mesh.positions = std::move(shape.positions);
+  mesh.normals = std::move(shape.normals);
+  mesh.tangents = std::move(shape.tangents);
   return mesh;
 }
 
@@ -196,6 +194,7 @@ Result<Instances> instances_of(const Document& document, const Node& node) {
     const float* const q = r.data() + 4 * i;
     const double length = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] +
                                     double{q[2]} * q[2] + double{q[3]} * q[3]);
+    instances.num_unturned += node.instance_rotations < 0 || length > 0 ? 0 : 1;
     const Quaternion turn =
         length > 0 ? Quaternion{q[0] / length, q[1] / length, q[2] / length, q[3] / length}
                    : Quaternion{};
@@ -207,7 +206,9 @@ Result<Instances> instances_of(const Document& document, const Node& node) {
 
 Result<TriangleMesh> primitive_mesh(const Document& document, const MeshSpec& spec) {
   BATON_ASSIGN(const Opened opened, open_primitive(document, spec));
-  return built_mesh(document, spec, opened);
+  TriangleMesh mesh = built_mesh(opened);
+  if (mesh.triangles.empty()) return without_triangles(document, spec, mesh.dropped_triangles);
+  return mesh;
 }
 
 Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const NodeMotion> motion,
@@ -222,13 +223,21 @@ Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const
                Shaper::read(document, by.node, static_cast<std::size_t>(spec.primitive),
                             opened.vertices, opened.parts.normals, opened.parts.tangents));
   opened.vertices.repairs += shaper.repairs();
-  if (by.animation)
-    return deforming_mesh(
-        document, spec, std::move(opened),
-        std::make_shared<const AnimatedShape>(std::move(motion), by, std::move(shaper)));
-  take_shape(shaper.shape(motion->at_rest(), NodeMotion::weights_at_rest(document, by.node)),
-             opened.vertices);
-  return built_mesh(document, spec, opened);
+  if (by.animation) {
+    const auto deformation =
+        std::make_shared<const AnimatedShape>(std::move(motion), by, std::move(shaper));
+    BATON_ASSIGN(TriangleMesh mesh, listed_mesh(document, spec, std::move(opened),
+                                                deformation->at(by.animation->start_frame)));
+    mesh.deformation = deformation;
+    return mesh;
+  }
+  MeshShape shape = shaper.shape(motion->at_rest(), NodeMotion::weights_at_rest(document, by.node));
+  take_shape(shape, opened.vertices);
+  TriangleMesh mesh = built_mesh(opened);
+  if (!mesh.triangles.empty()) return mesh;
+  // What has area in another shape is there, and no ray meets it.
+  opened.vertices.repairs.shrunk = 1;
+  return listed_mesh(document, spec, std::move(opened), std::move(shape));
 }
 
 void place(const std::vector<PlacedNode>& places, NodeMotion& motion) {

@@ -98,21 +98,21 @@ bool is_idle(const Document& document, const Channel& channel) {
   return node.mesh < 0 || document.mesh_of(node).num_targets() == 0;
 }
 
-/// Where several keys have one time the last one counts. row: numbers a key. Returns how many were
-/// left out.
+/// Where several keys have one time the curve jumps from the first to the last of them; others are
+/// left out. row: numbers a key. Returns how many have the time of another.
 std::size_t drop_repeated(Curve& curve, std::size_t row) {
-  std::size_t kept = 0;
+  std::size_t kept = 0, repeated = 0;
   for (std::size_t k = 0; k < curve.times.size(); ++k) {
-    if (kept > 0 && curve.times[k] == curve.times[kept - 1]) --kept;
+    repeated += k > 0 && curve.times[k] == curve.times[k - 1] ? 1 : 0;
+    if (kept > 1 && curve.times[k] == curve.times[kept - 2]) --kept;
     curve.times[kept] = curve.times[k];
     std::copy_n(curve.values.begin() + static_cast<std::ptrdiff_t>(k * row), row,
                 curve.values.begin() + static_cast<std::ptrdiff_t>(kept * row));
     ++kept;
   }
-  const std::size_t dropped = curve.times.size() - kept;
   curve.times.resize(kept);
   curve.values.resize(kept * row);
-  return dropped;
+  return repeated;
 }
 
 /// Makes tangents of a cubic curve 0 that are not finite; those before the first and behind the
@@ -129,12 +129,19 @@ void mend_slopes(Curve& curve, std::size_t width, KeyRepairs& repairs) {
   }
 }
 
-/// Leaves keys out that are not finite, and puts the others into the order of their times. rows:
-/// of `width` numbers a key.
-void sort_keys(Curve& curve, std::size_t rows, std::size_t width, KeyRepairs& repairs) {
+/// Leaves keys out that are not finite, or rotations of zeros, and puts the others into the order
+/// of their times. rows: of `width` numbers a key.
+void sort_keys(Curve& curve, bool turns, std::size_t rows, std::size_t width, KeyRepairs& repairs) {
+  const auto is_rotation = [&](std::size_t k) {
+    const auto first =
+        curve.values.begin() + static_cast<std::ptrdiff_t>((k * rows + rows / 2) * width);
+    return std::any_of(first, first + static_cast<std::ptrdiff_t>(width),
+                       [](float v) { return v != 0; });
+  };
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < curve.times.size(); ++k) {
-    if (!std::isfinite(curve.times[k]) || !is_finite(curve.values, rows * width, k)) {
+    if (!std::isfinite(curve.times[k]) || !is_finite(curve.values, rows * width, k) ||
+        (turns && !is_rotation(k))) {
       ++repairs.unusable;
       continue;
     }
@@ -174,7 +181,7 @@ Result<Curve> read_curve(const Document& document, const Channel& channel, KeyRe
         fmt::format("$.accessors[{}]: expected {} numbers for an animation, got {}", channel.output,
                     expected, curve.values.size()));
   if (rows > 1) mend_slopes(curve, width, repairs);
-  sort_keys(curve, rows, width, repairs);
+  sort_keys(curve, channel.path == Path::rotation, rows, width, repairs);
   repairs.repeated += drop_repeated(curve, rows * width);
   return curve;
 }
@@ -254,9 +261,11 @@ std::vector<std::string> NodeMotion::notes() const {
     if (count > 0) notes.push_back(fmt::format("{} {}", count, what));
   };
   add(repairs_.repeated,
-      "keys of its animations are at the time of another, of which the last counts");
+      "keys of its animations are at the time of another: the curve jumps there to the last");
   add(repairs_.unusable,
-      "keys of its animations have a time or value that is not finite: they are left out");
+      "keys of its animations have a time or value that is not finite, or a rotation of zeros: "
+      "they "
+      "are left out");
   add(repairs_.slopes, "tangents of keys of its animations are not finite: they count as 0");
   add(repairs_.unordered,
       "keys of its animations are earlier than the one before: they are put into order");

@@ -13,7 +13,8 @@ namespace baton::gltf {
 /// Values over time, (times, width); cubic: (times, 3, width) with the tangents before and behind.
 struct Curve {
   Interpolation interpolation = Interpolation::linear;
-  std::vector<float> times;  ///< seconds, ascending, at least one
+  /// Seconds, ascending, at least one. Two may be alike: the curve jumps from one to the other.
+  std::vector<float> times;
   std::vector<float> values;
 
   /// Rotations are unit quaternions. Held before the first time and after the last one. A key shows
@@ -26,8 +27,8 @@ struct Curve {
 
 /// Keys of curves that could not be used as they are.
 struct KeyRepairs {
-  std::size_t repeated = 0;  ///< another one at their time replaces them
-  /// Their time or value is not finite: left out.
+  std::size_t repeated = 0;  ///< another one before them has their time
+  /// Their time or value is not finite, or a rotation of zeros: left out.
   std::size_t unusable = 0;
   std::size_t slopes = 0;  ///< their tangents are not finite: 0
   /// Earlier than the one before them: put into order.
@@ -46,8 +47,8 @@ class NodeMotion {
                                  const std::string& animation = "");
 
   const Document& document() const { return *document_; }
-  /// What is odd about the animations and read in spite of that, a line each: keys at one time, of
-  /// which the last one counts, keys that are not finite or out of order, weights of what has no
+  /// What is odd about the animations and read in spite of that, a line each: keys at one time,
+  /// where curves jump, keys that are not finite or out of order, weights of what has no
   /// targets, animations that move the same.
   std::vector<std::string> notes() const;
   /// Lets go of all of the document but its nodes, skins and what its meshes are called and made

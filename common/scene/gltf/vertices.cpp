@@ -203,6 +203,7 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
           fmt::format("{}: expected a vertex index below {}, found {}", place, count, index));
   }
   v.corners = triangles_of(indices, primitive.mode);
+  v.repairs.spare_indices = primitive.mode == kTriangles ? indices.size() % 3 : 0;
   drop_nowhere(v);
   mend_coordinates(v);
   mend_vertices(document, primitive, v);

@@ -101,7 +101,8 @@ Status DetailLoader::place(const std::optional<TextureSpec>& spec, TextureUse us
   const auto first =
       std::ranges::find_if(tiles->images, [](const auto& t) { return t != nullptr; });
   placed = placed_texture(*spec, *first);
-  placed.sampling.wrap_u = placed.sampling.wrap_v = Wrap::tile;
+  // What lies beyond a tile is another: footprints are folded at its edges.
+  placed.sampling.wrap_u = placed.sampling.wrap_v = Wrap::mirror;
   placed.tiles = std::move(tiles);
   return {};
 }

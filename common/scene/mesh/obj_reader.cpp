@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "common/scene/mesh/mesh_readers.h"
+#include "common/scene/mesh/mesh_text.h"
 #include "common/scene/mesh/polygons.h"
 
 namespace baton {
@@ -33,14 +35,28 @@ class Words {
   std::string_view line_;
 };
 
-template <class T>
-std::optional<T> number(std::string_view word) {
+std::optional<std::int64_t> whole_number(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
-  T value{};
+  std::int64_t value = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
   return value;
 }
+
+/// Begin a curve or a surface of a formula.
+constexpr std::string_view kFormulas[] = {"curv", "surf", "cdc", "cdp", "bsp", "bzp"};
+/// Say nothing of triangles: groups, names, materials, smoothing, and what belongs to formulas.
+constexpr std::string_view kOfNoFace[] = {
+    "g",     "o",    "s",     "mg",         "usemtl",    "mtllib", "usemap", "maplib",
+    "bevel", "lod",  "ctech", "c_interp",   "d_interp",  "stech",  "vp",     "cstype",
+    "deg",   "bmat", "step",  "shadow_obj", "trace_obj", "curv2",  "parm",   "trim",
+    "hole",  "scrv", "sp",    "end",        "con",       "res"};
+
+/// How long a list must be for the faces that name its entries.
+struct Needed {
+  std::int64_t count = 0;
+  int line = 0;  ///< of the face that needs the last one
+};
 
 /// Reads one file.
 class ObjReader {
@@ -59,9 +75,14 @@ class ObjReader {
         line = take_line();
       }
       if (!joined.empty()) line = joined += line;
-      BATON_TRY(read_line(line.substr(0, line.find('#'))));
+      std::size_t end = 0;
+      while (end < line.size() && !is_comment(line, end)) ++end;
+      BATON_TRY(read_line(line.substr(0, end)));
     }
     if (polygons_.positions.empty()) return fail("not a mesh: no vertices (lines \"v x y z\")");
+    BATON_TRY(check(needed_positions_, polygons_.positions.size(), "vertices"));
+    BATON_TRY(check(needed_uvs_, polygons_.uvs.size(), "texture coordinates"));
+    BATON_TRY(check(needed_normals_, polygons_.normals.size(), "normals"));
     if (!any_normal_) polygons_.corner_normals.clear();
     if (!any_uv_) polygons_.corner_uvs.clear();
     if (!any_normal_) polygons_.normals.clear();
@@ -71,16 +92,22 @@ class ObjReader {
 
  private:
   std::string_view take_line() {
-    const std::size_t end = std::min(text_.find('\n'), text_.size());
-    std::string_view line = text_.substr(0, end);
-    text_.remove_prefix(std::min(end + 1, text_.size()));
-    if (line.ends_with('\r')) line.remove_suffix(1);
+    const LineEnd end = find_line_end(text_);
+    const std::string_view line = text_.substr(0, end.length);
+    text_.remove_prefix(end.next);
     ++line_number_;
     return line;
   }
   Error fail(const std::string& what) const { return {ErrorKind::bad_input, name_ + ": " + what}; }
-  Error bad_line(const std::string& what) const {
-    return fail("not a mesh: line " + std::to_string(line_number_) + ": " + what);
+  Error bad_line(const std::string& what) const { return bad_line(line_number_, what); }
+  Error bad_line(int line, const std::string& what) const {
+    return fail("not a mesh: line " + std::to_string(line) + ": " + what);
+  }
+  /// Faces may come before what they name.
+  Status check(const Needed& needed, std::size_t count, const std::string& what) const {
+    if (needed.count <= static_cast<std::int64_t>(count)) return {};
+    return bad_line(needed.line, "expected " + what + " from 1 to " + std::to_string(count) +
+                                     ", which the file has, got " + std::to_string(needed.count));
   }
 
   Status read_line(std::string_view line) {
@@ -90,8 +117,16 @@ class ObjReader {
     if (keyword == "vn") return read_normal(words);
     if (keyword == "vt") return read_uv(words);
     if (keyword == "f" || keyword == "fo") return read_face(words);
-    if (keyword == "l" || keyword == "p") ++polygons_.lines;
-    // Groups, materials and surfaces of formulas say nothing of triangles.
+    const auto is_of = [&](const auto& words_of) {
+      return std::ranges::find(words_of, keyword) != std::end(words_of);
+    };
+    if (keyword == "l" || keyword == "p") {
+      ++polygons_.lines;
+    } else if (is_of(kFormulas)) {
+      ++polygons_.formulas;
+    } else if (!keyword.empty() && !is_of(kOfNoFace)) {
+      ++polygons_.unread_lines;
+    }
     return {};
   }
 
@@ -101,7 +136,7 @@ class ObjReader {
     for (std::size_t i = 0; i < N; ++i) {
       const std::string_view word = words.next();
       if (word.empty() && i >= least) break;
-      const auto value = number<double>(word);
+      const auto value = real_number(word);
       if (!value) return std::nullopt;
       values[i] = *value;
     }
@@ -143,12 +178,12 @@ class ObjReader {
         parts[k] = word.substr(0, end);
         word.remove_prefix(std::min(end + 1, word.size()));
       }
-      const auto position = index(parts[0], polygons_.positions.size());
-      const auto uv = index(parts[1], polygons_.uvs.size());
-      const auto normal = index(parts[2], polygons_.normals.size());
+      const auto position = index(parts[0], polygons_.positions.size(), needed_positions_);
+      const auto uv = index(parts[1], polygons_.uvs.size(), needed_uvs_);
+      const auto normal = index(parts[2], polygons_.normals.size(), needed_normals_);
       if (!position || *position == Polygons::kNone || !uv || !normal)
-        return bad_line("expected corners of vertices 1 to " +
-                        std::to_string(polygons_.positions.size()) + " that are there");
+        return bad_line("expected corners of vertices, counted from 1 or back from -1 = vertex " +
+                        std::to_string(polygons_.positions.size()));
       polygons_.corners.push_back(*position);
       polygons_.corner_uvs.push_back(*uv);
       polygons_.corner_normals.push_back(*normal);
@@ -161,14 +196,17 @@ class ObjReader {
     return {};
   }
 
-  /// A place in a list; kNone where nothing stands or 0; nullopt: not there.
-  static std::optional<std::uint32_t> index(std::string_view word, std::size_t count) {
+  /// A place in a list, so far of `count` entries; kNone where nothing stands or 0; nullopt: cannot
+  /// be there.
+  std::optional<std::uint32_t> index(std::string_view word, std::size_t count,
+                                     Needed& needed) const {
     if (word.empty()) return Polygons::kNone;
-    const auto given = number<std::int64_t>(word);
+    const auto given = whole_number(word);
     if (!given) return std::nullopt;
     if (*given == 0) return Polygons::kNone;
     const std::int64_t at = *given > 0 ? *given - 1 : static_cast<std::int64_t>(count) + *given;
-    if (at < 0 || at >= static_cast<std::int64_t>(count)) return std::nullopt;
+    if (at < 0 || at >= std::int64_t{Polygons::kNone}) return std::nullopt;
+    if (at >= needed.count) needed = {at + 1, line_number_};
     return static_cast<std::uint32_t>(at);
   }
 
@@ -176,6 +214,7 @@ class ObjReader {
   const std::string& name_;
   int line_number_ = 0;
   Polygons polygons_;
+  Needed needed_positions_, needed_uvs_, needed_normals_;
   bool any_normal_ = false, any_uv_ = false;
 };
 
@@ -183,7 +222,8 @@ class ObjReader {
 
 Result<TriangleMesh> parse_obj(std::string_view text, const std::string& name, bool with_normals,
                                bool with_uvs) {
-  BATON_ASSIGN(const Polygons polygons, ObjReader(text, name).read());
+  BATON_ASSIGN(const std::string_view plain, without_mark(text, name));
+  BATON_ASSIGN(const Polygons polygons, ObjReader(plain, name).read());
   return mesh_of(polygons, with_normals, with_uvs);
 }
 

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "common/scene/mesh/mesh_readers.h"
+#include "common/scene/mesh/mesh_text.h"
 #include "common/scene/mesh/polygons.h"
 
 namespace baton {
@@ -114,7 +114,7 @@ constexpr std::pair<std::string_view, Role> kOfVertex[] = {{"x", Role::x},
                                                            {"diffuse_blue", Role::blue},
                                                            {"diffuse_alpha", Role::alpha}};
 
-constexpr bool is_color(Role role) { return role >= Role::red && role <= Role::blue; }
+constexpr bool is_color(Role role) { return role >= Role::red && role <= Role::alpha; }
 
 Role role_of_vertex(std::string_view name) {
   const auto* const found =
@@ -141,12 +141,14 @@ void find_unread_colors(Header& header) {
       const Role role = role_of_vertex(property.name);
       if (!property.count_type && is_color(role)) colors.insert(role);
     }
-    const bool is_read = element.is_vertex && colors.size() == 3;
+    const bool has_all =
+        colors.contains(Role::red) && colors.contains(Role::green) && colors.contains(Role::blue);
+    const bool is_read = element.is_vertex && has_all;
     element.has_unread_color =
         !colors.empty() && !is_read && (element.is_vertex || element.name == "face");
     if (is_read || !element.is_vertex) continue;
     for (Property& property : element.properties) {
-      if (property.role >= Role::red && property.role <= Role::alpha) property.role = Role::nothing;
+      if (is_color(property.role)) property.role = Role::nothing;
     }
   }
 }
@@ -158,8 +160,12 @@ Result<Header> parse_header(std::string_view bytes, const std::string& name) {
   if (!bytes.starts_with("ply")) return fail("not a mesh: expected \"ply\" in line 1");
   Header header;
   int line_number = 0;
+  // All lines end as the first one: binary data may begin as a line end does.
+  const LineEnd first = find_line_end(bytes);
+  const std::string_view line_end = bytes.substr(first.length, first.next - first.length);
   while (header.size_bytes < bytes.size()) {
-    const std::size_t end = std::min(bytes.find('\n', header.size_bytes), bytes.size());
+    const std::size_t end =
+        std::min(bytes.find(line_end == "\r" ? '\r' : '\n', header.size_bytes), bytes.size());
     const std::string line(bytes.substr(header.size_bytes, end - header.size_bytes));
     header.size_bytes = std::min(end + 1, bytes.size());
     std::istringstream words(line);
@@ -227,13 +233,9 @@ class ValueReader {
  private:
   std::optional<double> next_word() {
     while (at_ < bytes_.size() && static_cast<unsigned char>(bytes_[at_]) <= ' ') ++at_;
-    if (at_ < bytes_.size() && bytes_[at_] == '+') ++at_;
-    double value = 0;
-    const char* begin = bytes_.data() + at_;
-    const auto [end, error] = std::from_chars(begin, bytes_.data() + bytes_.size(), value);
-    if (error != std::errc{}) return std::nullopt;
-    at_ += static_cast<std::size_t>(end - begin);
-    return value;
+    const std::size_t begin = at_;
+    while (at_ < bytes_.size() && static_cast<unsigned char>(bytes_[at_]) > ' ') ++at_;
+    return real_number(bytes_.substr(begin, at_ - begin));
   }
   template <class T>
   std::optional<double> next_binary() {
@@ -306,7 +308,7 @@ class PlyReader {
         return error_at(element.name, index, "expected a number of property " + property.name);
       if (property.count_type) {
         BATON_TRY(read_list(element, index, property, *value));
-      } else if (property.role >= Role::red && property.role <= Role::alpha) {
+      } else if (is_color(property.role)) {
         const auto channel =
             static_cast<std::size_t>(property.role) - static_cast<std::size_t>(Role::red);
         color[channel] = channel_of(*value, property.type, property.role == Role::alpha, is_sound);
@@ -400,7 +402,8 @@ class PlyReader {
 
 }  // namespace
 
-Result<TriangleMesh> parse_ply(std::string_view bytes, const std::string& name, bool with_normals) {
+Result<TriangleMesh> parse_ply(std::string_view file, const std::string& name, bool with_normals) {
+  BATON_ASSIGN(const std::string_view bytes, without_mark(file, name));
   BATON_ASSIGN(const Header header, parse_header(bytes, name));
 
   // A record without properties takes no bytes: its count could not be checked by reading.

@@ -90,6 +90,12 @@ class EarCutter {
 
   std::vector<Triangle> cut(bool& is_simple) {
     while (left_.size() > 3) {
+      // A way there and back has no area.
+      if (const std::size_t tip = find([&](std::size_t i) { return is_tip(i); });
+          tip != left_.size()) {
+        left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(tip));
+        continue;
+      }
       std::size_t ear = find([&](std::size_t i) { return is_ear(i); });
       // Corners on a line with their neighbours have nothing to cut.
       if (ear == left_.size()) ear = find([&](std::size_t i) { return corner_turn(i) == 0; });
@@ -102,6 +108,8 @@ class EarCutter {
       triangles_.push_back({before(ear), left_[ear], after(ear)});
       left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(ear));
     }
+    // All ears turn with the polygon: what is left does not where one was none.
+    is_simple = is_simple && corner_turn(1) >= 0;
     triangles_.push_back({left_[0], left_[1], left_[2]});
     return triangles_;
   }
@@ -118,14 +126,36 @@ class EarCutter {
   double corner_turn(std::size_t i) const {
     return turn(points_[before(i)], points_[left_[i]], points_[after(i)]);
   }
-  /// No other corner is in the triangle; those at its corners, as of a cut to a hole, may be.
+  /// Both neighbours lie in one direction, or one at the corner itself.
+  bool is_tip(std::size_t i) const {
+    const Point &a = points_[before(i)], &b = points_[left_[i]], &c = points_[after(i)];
+    const double along = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1]);
+    return turn(a, b, c) == 0 && along >= 0;
+  }
+  /// No other corner is in the triangle; those at its corners, as of a cut to a hole or where the
+  /// outline touches itself, may be, if no edge of theirs leads into it.
   bool is_ear(std::size_t i) const {
     if (!(corner_turn(i) > 0)) return false;
-    const Point &a = points_[before(i)], &b = points_[left_[i]], &c = points_[after(i)];
-    return std::ranges::none_of(left_, [&](std::uint32_t other) {
-      const Point& p = points_[other];
-      if (p == a || p == b || p == c) return false;
-      return turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
+    const std::array<std::uint32_t, 3> ear{before(i), left_[i], after(i)};
+    const Point &a = points_[ear[0]], &b = points_[ear[1]], &c = points_[ear[2]];
+    for (std::size_t k = 0; k < left_.size(); ++k) {
+      const Point& p = points_[left_[k]];
+      if (std::ranges::find(ear, left_[k]) != ear.end()) continue;
+      const bool is_inside = p == a   ? leads_between(k, a, b, c)
+                             : p == b ? leads_between(k, b, c, a)
+                             : p == c
+                                 ? leads_between(k, c, a, b)
+                                 : turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
+      if (is_inside) return false;
+    }
+    return true;
+  }
+  /// Whether an edge at corner k, which is at `tip`, leads between the directions from there to
+  /// `right` and to `left`.
+  bool leads_between(std::size_t k, const Point& tip, const Point& right, const Point& left) const {
+    return std::ranges::any_of(std::array{before(k), after(k)}, [&](std::uint32_t neighbor) {
+      const Point& p = points_[neighbor];
+      return turn(tip, right, p) > 0 && turn(tip, p, left) > 0;
     });
   }
 
@@ -203,6 +233,8 @@ class FaceTaker {
     mesh.repairs.lines = polygons_.lines;
     mesh.repairs.colors = polygons_.bad_colors;
     mesh.repairs.unread_colors = polygons_.unread_colors;
+    mesh.repairs.formulas = polygons_.formulas;
+    mesh.repairs.unread_lines = polygons_.unread_lines;
     return mesh;
   }
 

@@ -25,8 +25,8 @@ struct Polygons {
   std::vector<std::uint32_t> corners, corner_normals, corner_uvs;
   std::vector<std::uint32_t> sizes;  ///< corners of each face
   std::uint64_t lines = 0;           ///< points and lines, which have no surface
-  /// Vertices and faces as MeshRepairs counts them.
-  std::uint64_t bad_colors = 0, unread_colors = 0;
+  /// As MeshRepairs counts them.
+  std::uint64_t bad_colors = 0, unread_colors = 0, formulas = 0, unread_lines = 0;
 
   std::size_t num_faces() const { return sizes.size(); }
 };

@@ -34,6 +34,11 @@ std::span<const RepairKind> repair_kinds() {
        "vertices have colours that are not from 0 to 1: they are cut, or white"},
       {&MeshRepairs::unread_colors,
        "vertices or faces have colours in a form that is not read: they count as white"},
+      {&MeshRepairs::formulas, "curves or surfaces of formulas are not shown"},
+      {&MeshRepairs::unread_lines,
+       "lines begin with a word that is not known, or call another file: they are left out"},
+      {&MeshRepairs::spare_indices, "indices at the end of lists of triangles make none"},
+      {&MeshRepairs::shrunk, "parts are shrunk to nothing by their bones or morph weights"},
   };
   static_assert(sizeof(MeshRepairs) == std::size(kKinds) * sizeof(std::uint64_t));
   return kKinds;

@@ -41,6 +41,14 @@ struct MeshRepairs {
   std::uint64_t colors = 0;
   /// Vertices and faces with colours in a form that is not read.
   std::uint64_t unread_colors = 0;
+  /// Curves and surfaces that formulas describe, which are not shown.
+  std::uint64_t formulas = 0;
+  /// Lines of a text whose first word says nothing that is known.
+  std::uint64_t unread_lines = 0;
+  /// Indices at the end of a list of triangles that make none.
+  std::uint64_t spare_indices = 0;
+  /// Parts that bones or morph weights leave no area.
+  std::uint64_t shrunk = 0;
 
   bool operator==(const MeshRepairs&) const = default;
   MeshRepairs& operator+=(const MeshRepairs& other);

@@ -210,6 +210,11 @@ class SceneTaker {
     const std::size_t all = instances.places.size() + instances.num_nowhere;
     leave_out(node, flat, all, "a scale of 0 in all frames");
     leave_out(node, instances.num_nowhere, all, "a place that is not finite");
+    if (instances.num_unturned > 0)
+      left_out_.push_back(fmt::format(
+          "{}: {} of {} instances of node \"{}\" have a rotation of zeros: they are not "
+          "turned",
+          file_.path, instances.num_unturned, all, object_names_[node]));
     return {};
   }
 

@@ -31,8 +31,6 @@ enum class Wrap : std::uint8_t {
   repeat,
   clamp,
   mirror,
-  /// As clamp, but by the edge of each level: what lies beyond is another image.
-  tile,
 };
 
 /// How a texture is looked up.

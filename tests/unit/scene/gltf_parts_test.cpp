@@ -125,6 +125,25 @@ TEST(GltfParts, APartWithoutNormalsLeavesThoseOfOthers) {
   EXPECT_EQ(mesh->repairs.normals, 3u);
 }
 
+TEST(GltfParts, WhatSaysNothingIsLeftOutAndSaid) {
+  // Spare indices, with a list and without.
+  GltfWriter w;
+  w.add(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0}, "VEC3", 3);
+  w.add(std::vector<std::uint16_t>{0, 1, 2, 2, 1}, "SCALAR", 1);
+  const auto path = write_test_file(
+      "spare.glb", w.glb(R"("nodes":[{"mesh":0,"rotation":[0,0,0,0]}],"meshes":[{"primitives":[
+        {"attributes":{"POSITION":0},"indices":1},{"attributes":{"POSITION":0}}]}],
+        "animations":[{"samplers":[{"input":1,"output":1,"interpolation":"CUBIC"}],"channels":[]}])"));
+  const auto mesh = load_mesh(path, true);
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_EQ(mesh->repairs.spare_indices, 3u);
+  const auto document = gltf::read_document(path);
+  ASSERT_TRUE(document) << document.error().message;
+  EXPECT_THAT((*document)->notes,
+              testing::IsSupersetOf({HasSubstr("1 nodes have a rotation of zeros"),
+                                     HasSubstr("interpolations CUBIC are not known")}));
+}
+
 TEST(GltfParts, PartsThatHaveNoSurfaceAreLeftOutAndSaid) {
   GltfWriter w;
   w.add(test::kTriangle, "VEC3", 3);

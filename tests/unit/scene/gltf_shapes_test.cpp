@@ -7,6 +7,7 @@
 #include "common/job/motion.h"
 #include "common/job/text/job_json.h"
 #include "common/scene/mesh_loader.h"
+#include "common/scene/object_view.h"
 #include "common/scene/pose.h"
 #include "common/scene/settle/settle_motion.h"
 #include "common/scene/settle/settle_scene.h"
@@ -115,6 +116,32 @@ TEST(GltfShapes, WhatRestsIsAMeshLikeOthers) {
   expect_near(Loaded(parts).point(0, 2), {2, 2, 100});
   parts.node_more = R"(,"weights":[2])";
   expect_near(Loaded(parts).point(0, 2), {2, 5, 100});
+}
+
+TEST(GltfShapes, WhatIsShrunkToNothingAtRestLeavesTheOthers) {
+  const auto expect_nothing = [](const BarParts& parts) {
+    const Loaded bar(parts);
+    ASSERT_EQ(bar.scene.meshes.size(), 1u);
+    const TriangleMesh& mesh = bar.scene.meshes[0];
+    ASSERT_EQ(mesh.triangles.size(), 1u);
+    for (const std::uint32_t corner : mesh.triangles[0])
+      EXPECT_TRUE(std::isfinite(length(mesh.positions[corner])));
+    EXPECT_EQ(mesh.repairs.shrunk, 1u);
+    EXPECT_THAT(geometry_warnings(bar.job, bar.scene),
+                testing::Contains(HasSubstr("1 parts are shrunk to nothing by their bones or")));
+  };
+  BarParts parts;
+  parts.animated = false;
+  for (const char* scale : {"[0,0,0]", "[0,0,1]", "[1,0,1]"}) {
+    parts.root_more = std::string(",\"scale\":") + scale;
+    expect_nothing(parts);
+  }
+  parts.root_more = "";
+  parts.skinned = false;
+  parts.morphed = true;
+  parts.target = {0, 0, 0, 0, 0, 0, 0, -1, 0};
+  parts.mesh_more = R"(,"weights":[1])";
+  expect_nothing(parts);
 }
 
 TEST(GltfShapes, TargetsComeOnByLinearStepAndCubicCurves) {

@@ -209,6 +209,73 @@ TEST(GltfTime, OfKeysAtOneTimeTheLastCounts) {
   }
 }
 
+/// A node that turns by keys of one second each, and where it is.
+Result<gltf::NodeMotion> motion_of(const std::string& name, const std::string& path,
+                                   const std::string& curve, const std::vector<float>& times,
+                                   const std::vector<float>& values) {
+  GltfWriter w;
+  w.add(test::kTriangle, "VEC3", 3);
+  w.add(times, "SCALAR", 1);
+  path == "rotation" ? w.add(values, "VEC4", 4) : w.add(values, "VEC3", 3);
+  const auto document = gltf::read_document(test::write_test_file(
+      name,
+      w.glb(R"("nodes":[{"name":"a","mesh":0}],)" + test::mesh_json("\"POSITION\":0") +
+            R"(,"animations":[{"samplers":[{"input":1,"output":2,"interpolation":")" + curve +
+            R"("}],"channels":[{"sampler":0,"target":{"node":0,"path":")" + path + R"("}}]}])")));
+  if (!document) return document.error();
+  return gltf::NodeMotion::read(*document);
+}
+
+// Up to the jump a curve leads to the first of the keys there, behind it from the last.
+TEST(GltfTime, KeysAtOneTimeAreAJump) {
+  const std::vector<float> times{0, 2, 2, 2, 4}, x{-0.5f, 0, 9, 0.25f, 1.25f};
+  std::vector<float> values, cubic;
+  for (const float v : x) {
+    values.insert(values.end(), {v, 0, 0});
+    cubic.insert(cubic.end(), {0, 0, 0, v, 0, 0, 0, 0, 0});
+  }
+  for (const auto& [curve, numbers, before] : {std::tuple{"LINEAR", values, -0.25f},
+                                               {"STEP", values, -0.5f},
+                                               {"CUBICSPLINE", cubic, -0.25f}}) {
+    const auto motion = motion_of("jump.glb", "translation", curve, times, numbers);
+    ASSERT_TRUE(motion) << motion.error().message;
+    const auto at = [&](double seconds) { return motion->to_world(seconds)[0][3]; };
+    EXPECT_NEAR(at(1), before, 1e-6) << curve;
+    EXPECT_NEAR(at(1.999), curve == std::string("STEP") ? -0.5 : 0, 1e-3) << curve;
+    EXPECT_NEAR(at(2), 0.25, 1e-6) << curve;
+    EXPECT_NEAR(at(3), curve == std::string("STEP") ? 0.25 : 0.75, 1e-6) << curve;
+    EXPECT_NEAR(at(9), 1.25, 1e-6) << curve;
+    EXPECT_THAT(motion->notes(), testing::Contains(testing::HasSubstr("2 keys of its")));
+  }
+  // At both ends.
+  const auto ends = motion_of("ends.glb", "translation", "LINEAR", {1, 1, 3, 3},
+                              {0, 0, 0, 4, 0, 0, 6, 0, 0, 8, 0, 0});
+  ASSERT_TRUE(ends) << ends.error().message;
+  for (const auto& [seconds, x_there] : {std::pair{0.0, 0.0}, {1.0, 4.0}, {2.0, 5.0}, {3.0, 8.0}})
+    EXPECT_NEAR(ends->to_world(seconds)[0][3], x_there, 1e-6) << seconds;
+}
+
+TEST(GltfTime, ARotationOfZerosIsNoKey) {
+  const float h = std::sqrt(0.5f);
+  const std::vector<float> turned{0, 0, 0, 1, 0, 0, 0, 0, 0, 0, h, h};
+  std::vector<float> cubic;
+  for (std::size_t k = 0; k < 3; ++k) {
+    cubic.insert(cubic.end(), 4, 0.0f);
+    cubic.insert(cubic.end(), turned.begin() + static_cast<long>(4 * k),
+                 turned.begin() + static_cast<long>(4 * k + 4));
+    cubic.insert(cubic.end(), 4, 0.0f);
+  }
+  for (const auto& [curve, numbers] : {std::pair{"LINEAR", turned}, {"CUBICSPLINE", cubic}}) {
+    const auto motion = motion_of("zeros.glb", "rotation", curve, {0, 2, 4}, numbers);
+    ASSERT_TRUE(motion) << motion.error().message;
+    const auto world = motion->to_world(2);
+    EXPECT_NEAR(std::atan2(world[0][4], world[0][0]) * 180 / 3.14159265, 45, 0.01) << curve;
+    EXPECT_THAT(motion->notes(),
+                testing::Contains(testing::HasSubstr("1 keys of its animations have "
+                                                     "a time or value that is")));
+  }
+}
+
 /// Three animations: "slide" moves node "a" along x, "lift" along y and grows "b", one without a
 /// name turns "b".
 std::string several_glb() {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <string>
 
+#include "common/scene/object_view.h"
 #include "tests/support/mesh_files.h"
 
 namespace baton {
@@ -39,6 +40,31 @@ void expect_point(const Vec3& actual, const Vec3& expected) {
   EXPECT_NEAR(actual.x, expected.x, 1e-5f);
   EXPECT_NEAR(actual.y, expected.y, 1e-5f);
   EXPECT_NEAR(actual.z, expected.z, 1e-5f);
+}
+
+TEST(Scene, ObjectsWhereFloatsAreCoarseAreSaid) {
+  const auto said = [](const Vec3& place, float distance, float half = 1) {
+    JobSpec job = cube_job();
+    job.frames = {FrameNumber(1)};
+    job.scene.objects[0].translate = place;
+    job.scene.objects[0].scale = {half, half, half};
+    job.camera.position = place + Vec3{0, 0, distance};
+    job.camera.look_at = place;
+    const auto scene = load_scene(job);
+    EXPECT_TRUE(scene.ok()) << scene.error().message;
+    return geometry_warnings(job, *scene);
+  };
+  const auto is_coarse =
+      testing::Contains(HasSubstr("object 0 (cube) is so far from the origin, "));
+  EXPECT_THAT(said({5e5f, 0, 5e6f}, 5), is_coarse);
+  EXPECT_THAT(said({5e5f, 0, 5e6f}, 5), testing::Contains(HasSubstr("rounded to 0.5 units")));
+  EXPECT_THAT(said({0, -3e5f, 0}, 5), is_coarse);
+  EXPECT_THAT(said({3e3f, 0, 0}, 0.05f, 0.01f), is_coarse);
+  for (const auto& [place, distance, half] : {std::tuple{Vec3{0, 0, 0}, 5.0f, 1.0f},
+                                              {Vec3{100, 0, 30}, 5.0f, 1.0f},
+                                              {Vec3{5e5f, 0, 5e6f}, 3e4f, 5e3f},
+                                              {Vec3{0, 0, 0}, 0.5f, 1e5f}})
+    EXPECT_THAT(said(place, distance, half), testing::Not(is_coarse)) << place.z << ' ' << half;
 }
 
 TEST(Scene, ScalesThenRotatesThenTranslates) {

@@ -168,9 +168,48 @@ TEST(Texture, BeyondAClampedEdgeLiesTheEdgeOfTheImage) {
       EXPECT_NEAR(at(-width, -width, width, Wrap::clamp), 1, 2e-4f) << width;
       EXPECT_NEAR(at(-width, 1 + width, width, Wrap::clamp), 0, 2e-4f) << width;
     }
-    // Half of the footprint is outside.
-    EXPECT_NEAR(at(1, 0.6f, 0.25f, Wrap::clamp), 0.5f, 0.1f);
+    // A footprint within the image has no more of the edge than the image.
+    EXPECT_LT(at(1, 0.6f, 0.25f, Wrap::clamp), 0.15f);
     EXPECT_LT(at(1.5f, 0.6f, 0.25f, Wrap::repeat), 0.1f);
+  }
+}
+
+// A surface that ends with the image has its mean, and one that goes on that of image and edge,
+// however the footprints of its sites reach over the edge.
+TEST(Texture, SitesOfAClampedImageHaveItsMean) {
+  for (const int size : {64, 37, 5, 2}) {
+    // Dark in a bright frame one texel wide, whose columns on the left are brightest.
+    std::vector<float> texels(static_cast<std::size_t>(size * size));
+    double sum = 0;
+    for (int i = 0; i < size * size; ++i) {
+      const int x = i % size, y = i / size;
+      const bool is_frame = x == size - 1 || y == 0 || y == size - 1;
+      sum += texels[static_cast<std::size_t>(i)] = x == 0 ? 1.0f : is_frame ? 0.5f : 0.0f;
+    }
+    const double inside = sum / size / size;
+    const auto texture =
+        texture_of(image_of(size, size, 1, texels), TextureUse::metallic_roughness);
+    const auto mean = [&](const Footprint& seen, Wrap wrap, float from, float to) {
+      constexpr int kSites = 240;
+      double total = 0;
+      for (int i = 0; i < kSites * kSites; ++i) {
+        const float u = (static_cast<float>(i % kSites) + 0.5f) / kSites;
+        const float v = (static_cast<float>(i / kSites) + 0.5f) / kSites;
+        total += look_up(*texture, {from + (to - from) * u, v}, seen, {wrap, wrap, false})[0];
+      }
+      return total / kSites / kSites;
+    };
+    for (const float width : {0.02f, 0.1f, 0.3f, 0.9f, 2.5f}) {
+      for (const Footprint& seen : {Footprint{{width, 0}, {0, width}},
+                                    {{0, width}, {width / 9, 0}},
+                                    {{width, width / 2}, {0.01f, -0.02f}}}) {
+        for (const Wrap wrap : {Wrap::clamp, Wrap::mirror})
+          EXPECT_NEAR(mean(seen, wrap, 0, 1), inside, 0.012) << size << ' ' << width;
+        // Two images wide on the left: half of it is the edge.
+        EXPECT_NEAR(mean(seen, Wrap::clamp, -1, 1), (inside + 1) / 2, 0.012)
+            << size << ' ' << width;
+      }
+    }
   }
 }
 
