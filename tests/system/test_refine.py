@@ -4,7 +4,7 @@ split, whoever dies, and whatever was kept. `baton render` adds sweeps by itself
 
 import json
 
-from farm import BAD_INPUT, USAGE, Farm, check, check_equal, run_tests, wait_until
+from farm import BAD_INPUT, USAGE, Farm, Process, check, check_equal, run_tests, wait_until
 from jobs import make_job, write_job
 from test_motion import moving_job
 
@@ -139,6 +139,29 @@ def waiting_adds_sweeps(programs, folder):
             frame.unlink()
         told = farm.baton("job", "wait", said.stdout.strip()).stderr
         check("no frame tells its noise here: no more rounds" in told, told)
+
+
+def a_wait_that_is_repeated_adds_no_more(programs, folder):
+    """Killed whenever it has added rounds, and asked again with the ID that was printed first: the same rounds in the end."""
+    quality = {"rounds": 4, "noiseThreshold": 0.02, "maxRounds": 64}
+    expected = programs.rendered(folder / "rendered", turning(folder / "rendered", **quality))
+    path = write_job(folder / "farm/job.json", turning(folder / "farm", **quality))
+    with Farm(programs, folder / "work", workers=1) as farm:
+        ident = farm.submit(path)
+        command = [programs.path("baton"), "job", "wait", ident, "--coordinator", farm.endpoint]
+        kills = 0
+        for attempt in range(20):
+            waiting = Process(command, folder / f"wait{attempt}.log")
+            wait_until(lambda: "more\n" in waiting.log() or not waiting.alive(), "it adds rounds or ends")
+            if not waiting.alive():
+                break
+            waiting.kill()
+            kills += 1
+        check(kills > 0, "it was never killed")
+        farm.wait_for(ident)
+        shown = farm.show(ident)
+        check_equal((shown["id"], shown["status"]), (ident, "done"), "the job")
+    check_equal(programs.pixels(folder / "farm/frames"), expected, "pixels beside those of render")
 
 
 if __name__ == "__main__":
