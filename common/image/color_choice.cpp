@@ -46,7 +46,8 @@ std::string layer_of(const std::string& name) {
 /// A layer of a part, by what its channels are called.
 struct Layer {
   std::size_t part = 0;
-  std::string name{};  ///< with what divides it from the channel's, or empty
+  /// With what divides it from the channel's, or empty.
+  std::string name{};
   std::array<std::string, 3> rgb{};
   std::string x{}, y{}, ry{}, by{}, alpha{};
 

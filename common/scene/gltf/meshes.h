@@ -21,8 +21,9 @@ Shaping shaping_of(const NodeMotion& motion, int node);
 /// Where a node shows its mesh, in its own space.
 struct Instances {
   std::vector<Matrix> places;
-  std::uint64_t num_nowhere = 0;   ///< more, whose numbers are not finite
-  std::uint64_t num_unturned = 0;  ///< with a rotation of zeros, which turns nothing
+  std::uint64_t num_nowhere = 0;  ///< more, whose numbers are not finite
+  /// With a rotation of zeros, which turns nothing.
+  std::uint64_t num_unturned = 0;
 };
 /// Once, or at each place that the file lists (EXT_mesh_gpu_instancing). Errors: lists of unequal
 /// length.

@@ -77,7 +77,8 @@ struct Form {
   bool has_texture = false, has_colors = false, has_normals = false;
   /// The fourth number of a vertex divides the others.
   bool is_homogeneous = false;
-  bool has_dimension = false;  ///< the number of coordinates comes before the counts
+  /// The number of coordinates comes before the counts.
+  bool has_dimension = false;
 
   int coordinates() const { return is_homogeneous ? 4 : 3; }
   /// Numbers behind the coordinates. Colours are red, green, blue, alpha.
