@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdlib>
+#include <initializer_list>
 #include <iterator>
 #include <string>
 #include <vector>
@@ -34,6 +36,49 @@ inline std::string targa(int width, int height, int channels,
 inline std::string write_targa(const std::string& name, int width, int height, int channels,
                                const std::vector<std::uint8_t>& values) {
   return write_test_file(name, targa(width, height, channels, values));
+}
+
+/// A baseline JPEG file of 8 x 8 pixels of one colour, a byte for each component: its start, an
+/// Adobe mark (JPEG's own colours) or none, and its scan.
+inline std::string jpeg(const std::vector<std::uint8_t>& color, bool has_adobe) {
+  const auto n = static_cast<int>(color.size());
+  std::string bytes = "\xFF\xD8";
+  const auto put = [&](std::initializer_list<int> values) {
+    for (const int v : values) bytes += static_cast<char>(v);
+  };
+  if (has_adobe) {
+    put({0xFF, 0xEE, 0, 14, 'A', 'd', 'o', 'b', 'e', 0, 100, 0, 0, 0, 0, 0});
+  }
+  put({0xFF, 0xDB, 0, 67, 0});
+  bytes.append(64, '\1');
+  put({0xFF, 0xC0, 0, 8 + 3 * n, 8, 0, 8, 0, 8, n});
+  for (int i = 0; i < n; ++i) put({i + 1, 0x11, 0});
+  // Differences of up to 11 bits have codes of four, the end of a block one of one.
+  put({0xFF, 0xC4, 0, 31, 0, 0, 0, 0, 12, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  for (int i = 0; i < 12; ++i) put({i});
+  put({0xFF, 0xC4, 0, 20, 0x10, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  put({0xFF, 0xDA, 0, 6 + 2 * n, n});
+  for (int i = 0; i < n; ++i) put({i + 1, 0});
+  put({0, 63, 0});
+  std::string bits;
+  const auto append = [&](unsigned value, int width) {
+    for (int i = width - 1; i >= 0; --i) bits += (value >> i & 1) != 0 ? '1' : '0';
+  };
+  for (const std::uint8_t component : color) {
+    const int difference = (component - 128) * 8;
+    int width = 0;
+    while (std::abs(difference) >> width != 0) ++width;
+    append(static_cast<unsigned>(width), 4);
+    append(static_cast<unsigned>(difference > 0 ? difference : difference + (1 << width) - 1),
+           width);
+    bits += '0';
+  }
+  while (bits.size() % 8 != 0) bits += '1';
+  for (std::size_t i = 0; i < bits.size(); i += 8) {
+    put({static_cast<int>(std::stoul(bits.substr(i, 8), nullptr, 2))});
+    if (bytes.back() == '\xFF') put({0});
+  }
+  return bytes + "\xFF\xD9";
 }
 
 /// What a TIFF file says of its last channel.

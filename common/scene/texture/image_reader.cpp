@@ -8,10 +8,12 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <utility>
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/image/exr_image.h"
+#include "common/scene/texture/jpeg_form.h"
 #include "common/scene/texture/reader/interface.h"
 
 namespace baton {
@@ -103,12 +105,23 @@ std::string name_by_content(ByteView bytes) {
   return starts("RIFF") ? "image.webp" : "";
 }
 
-/// By its first bytes.
-bool is_exr(const std::string& path) {
+using FirstBytes = std::array<std::byte, 4>;
+
+FirstBytes first_bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  std::array<char, 4> start{};
-  file.read(start.data(), start.size());
-  return start == std::array{'\x76', '\x2f', '\x31', '\x01'};
+  FirstBytes start{};
+  file.read(reinterpret_cast<char*>(start.data()), start.size());
+  return start;
+}
+
+bool is_exr(const FirstBytes& start) {
+  return start == FirstBytes{std::byte{0x76}, std::byte{0x2f}, std::byte{0x31}, std::byte{0x01}};
+}
+
+/// What is read of the bytes of a JPEG file, with its notes.
+Result<Image> with_notes(Result<Image> image, ByteView bytes) {
+  if (image) image->notes = jpeg_notes(bytes);
+  return image;
 }
 
 Result<Image> read_exr_texture(const std::string& path) {
@@ -134,14 +147,18 @@ Result<Image> read_image(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
     return bad_image(path, "missing: expected an image file");
-  if (is_exr(path)) return read_exr_texture(path);
-  return read(path, std::nullopt, path);
+  const FirstBytes start = first_bytes(path);
+  if (is_exr(start)) return read_exr_texture(path);
+  if (!is_jpeg(start)) return read(path, std::nullopt, path);
+  BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
+  return with_notes(read(path, std::nullopt, path), bytes);
 }
 
 Result<Image> read_image(ByteView bytes, const std::string& name) {
   const std::string file_name = name_by_content(bytes);
   if (file_name.empty()) return bad_image(name, "not an image: expected PNG, JPEG or WebP");
-  return read(file_name, bytes, name);
+  Result<Image> image = read(file_name, bytes, name);
+  return is_jpeg(bytes) ? with_notes(std::move(image), bytes) : std::move(image);
 }
 
 }  // namespace baton

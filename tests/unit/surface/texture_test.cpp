@@ -357,6 +357,38 @@ TEST(ImageReader, ColoursOfWebpFilesAreNotMultipliedByAlpha) {
     EXPECT_NEAR(image->samples[i], expected[i] / 255, 1 / 255.0f) << i;
 }
 
+TEST(ImageReader, WhatIsOddAboutJpegFilesIsSaid) {
+  const auto read = [](const std::string& bytes) {
+    const Image file = read_image(write_test_file("odd.jpg", bytes)).value();
+    const Image same = read_image(std::as_bytes(std::span(bytes)), "set.glb, image 0").value();
+    EXPECT_EQ(file.samples, same.samples);
+    EXPECT_EQ(file.notes, same.notes);
+    return file;
+  };
+  const Image red = read(test::jpeg({255, 128, 0}, true));
+  EXPECT_THAT(std::vector(red.samples.begin(), red.samples.begin() + 3),
+              testing::Pointwise(testing::FloatNear(0.01f), std::array{1.0f, 0.5f, 0.0f}));
+  EXPECT_THAT(red.notes, testing::IsEmpty());
+  EXPECT_THAT(read(test::jpeg({128}, false)).notes, testing::IsEmpty());
+  EXPECT_THAT(read(test::jpeg({0, 127, 255, 255}, true)).notes, testing::IsEmpty());
+  EXPECT_THAT(read(test::jpeg({0, 127, 255, 0}, false)).notes,
+              testing::ElementsAre(HasSubstr("is CMYK without Adobe's mark")));
+  // A small picture within the file has an end of its own.
+  std::string whole = test::jpeg({255, 128, 0}, true);
+  whole.insert(2, std::string("\xFF\xE1\0\6\xFF\xD9\xFF\xD9", 8));
+  EXPECT_THAT(read(whole).notes, testing::IsEmpty());
+  EXPECT_THAT(read(whole + "more").notes, testing::IsEmpty());
+  for (const std::size_t cut : {1u, 2u, 4u})
+    EXPECT_THAT(read(whole.substr(0, whole.size() - cut)).notes,
+                testing::ElementsAre(HasSubstr("ends early")))
+        << cut;
+}
+
+TEST(ImageReader, AnyNameIsAName) {
+  for (const char* name : {"a?b.tga", "what?.tga", "50% #1 ?x=2&y.tga"})
+    EXPECT_EQ(error_of(read_image(write_targa(name, 1, 1, 3, {255, 0, 0}))), "none") << name;
+}
+
 TEST(ImageReader, SaysWhatIsWrong) {
   EXPECT_THAT(error_of(read_image("/no/such.png")),
               HasSubstr("/no/such.png: missing: expected an image file"));

@@ -5,6 +5,7 @@
 #include <OpenImageIO/strutil.h>
 
 #include <algorithm>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <string>
@@ -100,12 +101,19 @@ int read(const char* name, const void* bytes, std::size_t size, const BatonImage
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   std::unique_ptr<OIIO::Filesystem::IOProxy> memory;
+  std::string shown = name;
   if (bytes != nullptr) {
     memory = std::make_unique<OIIO::Filesystem::IOMemReader>(const_cast<void*>(bytes), size);
+  } else if (std::strchr(name, '?') != nullptr) {
+    // In a name OpenImageIO takes what follows for settings.
+    memory = std::make_unique<OIIO::Filesystem::IOFile>(name, OIIO::Filesystem::IOProxy::Read);
+    shown = "image" + OIIO::Filesystem::extension(name);
+  }
+  if (memory != nullptr) {
     void* const proxy = memory.get();
     config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
   }
-  const auto input = OIIO::ImageInput::open(name, &config, memory.get());
+  const auto input = OIIO::ImageInput::open(shown, &config, memory.get());
   if (input == nullptr) return fail(sink, OIIO::geterror());
   const OIIO::ImageSpec& spec = input->spec();
   if (spec.deep || spec.depth > 1) return fail(sink, "expected a flat image");
