@@ -141,6 +141,21 @@ def waiting_adds_sweeps(programs, folder):
         check("no frame tells its noise here: no more rounds" in told, told)
 
 
+def frames_of_several_sweeps_are_those_of_the_job(programs, folder):
+    """Where samples are carried from the last frame to the next sweep, other frames are another picture, and that is said."""
+    def several(place, frames):
+        return {**turning(place, rounds=2, sweeps=2), "frames": frames, "sampling": {"method": "sequential"}}
+
+    programs.render_in(folder, several(folder, "1-3"))
+    for frames in ("1-5", "1-2"):
+        path = write_job(folder / "job.json", several(folder, frames))
+        programs.refuses("render", path, "--work-dir", folder / "work",
+                         says=["$.frames (samples are carried from the last frame to the first of the next sweep)", "--restart"])
+    programs.run("baton", "render", write_job(folder / "job.json", several(folder, "1-5")), "--work-dir", folder / "work", "--restart")
+    expected = programs.rendered(folder / "whole", several(folder / "whole", "1-5"))
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels of all frames anew")
+
+
 def a_wait_that_is_repeated_adds_no_more(programs, folder):
     """Killed whenever it has added rounds, and asked again with the ID that was printed first: the same rounds in the end."""
     quality = {"rounds": 4, "noiseThreshold": 0.02, "maxRounds": 64}

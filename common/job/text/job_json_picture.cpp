@@ -250,6 +250,8 @@ std::string FrameComparison::difference(FrameIndex frame_a, FrameIndex frame_b) 
            std::to_string(frame.value());
   }
   if (sweeps_a_ != sweeps_b_) return "$.quality.sweeps";
+  if (std::min(sweeps_a_, sweeps_b_) > 1)
+    return "$.frames (samples are carried from the last frame to the first of the next sweep)";
   return "$.frames before frame " + std::to_string(frame.value()) + " (samples are carried)";
 }
 
