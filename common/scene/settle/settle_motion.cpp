@@ -15,6 +15,8 @@ namespace {
 /// Vertices that are looked at of each instance, spread evenly over the list of its mesh; fewer
 /// where there are many instances.
 constexpr std::size_t kMeshPoints = 2000, kLeastMeshPoints = 50, kScenePoints = 200000;
+/// Vertices over all frames, about two seconds: up to so many motion is measured in all of a shot.
+constexpr std::size_t kAllPoints = 50000000;
 /// Rays to the ground along each side of the image.
 constexpr int kGroundRays = 24;
 
@@ -47,17 +49,19 @@ class StepMeter {
   float largest_ = 0;
 };
 
-void add_meshes(const Scene& scene, const Pose& now, const Pose& before, StepMeter& meter) {
-  const std::size_t share = kScenePoints / std::max<std::size_t>(now.instances.size(), 1);
+/// points: of the scene that are looked at.
+void add_meshes(const Scene& scene, const Pose& now, const Pose& before, std::size_t points,
+                StepMeter& meter) {
+  const std::size_t share = points / std::max<std::size_t>(now.instances.size(), 1);
   const std::size_t most = std::clamp(share, kLeastMeshPoints, kMeshPoints);
   for (std::size_t i = 0; i < now.instances.size(); ++i) {
     if (now.instances[i].is_absent || before.instances[i].is_absent) continue;
     const std::uint32_t mesh = now.instances[i].mesh;
-    const std::span<const Vec3> points = vertices_of(scene, now.shapes, mesh).positions;
+    const std::span<const Vec3> seen = vertices_of(scene, now.shapes, mesh).positions;
     const std::span<const Vec3> old = vertices_of(scene, before.shapes, mesh).positions;
-    const std::size_t stride = std::max<std::size_t>(points.size() / most, 1);
-    for (std::size_t k = 0; k < points.size(); k += stride)
-      meter.add(now.instances[i].to_world.point(points[k]),
+    const std::size_t stride = std::max<std::size_t>(seen.size() / most, 1);
+    for (std::size_t k = 0; k < seen.size(); k += stride)
+      meter.add(now.instances[i].to_world.point(seen[k]),
                 before.instances[i].to_world.point(old[k]));
   }
 }
@@ -78,10 +82,6 @@ void add_ground(const JobSpec& job, const Camera& camera, StepMeter& meter) {
   }
 }
 
-/// Vertices of meshes that deform, over all frames, up to which motion is measured in all of a
-/// shot.
-constexpr double kMostShaped = 1e8;
-
 /// The frames between which motion is measured: from the first key to the last, those of the
 /// animations of meshes included, in the job's step, so that all jobs of a shot measure the same.
 /// Where that is too much, the job's frames.
@@ -92,12 +92,12 @@ std::vector<FrameNumber> measured_frames(const JobSpec& job, const Scene& scene)
   };
   add(job.camera.keys);
   for (const ObjectSpec& object : job.scene.objects) add(object.keys);
-  double shaped = 0;
+  auto points = static_cast<double>(kLeastMeshPoints * scene.instances.size());
   for (const TriangleMesh& mesh : scene.meshes) {
     if (mesh.deformation == nullptr) continue;
     const std::array<double, 2> moving = mesh.deformation->moving_frames();
     keys.insert(keys.end(), moving.begin(), moving.end());
-    shaped += static_cast<double>(mesh.positions.size());
+    points += static_cast<double>(mesh.positions.size());
   }
   const auto [first, last] = std::minmax_element(keys.begin(), keys.end());
   if (first == keys.end()) return job.frames;
@@ -108,7 +108,8 @@ std::vector<FrameNumber> measured_frames(const JobSpec& job, const Scene& scene)
       step = std::min(step, job.frames[i] - job.frames[i - 1]);
   }
   const double steps = (*last - *first) / step;
-  if (steps > limits::kMaxFrames || steps * shaped > kMostShaped) return job.frames;
+  if (steps > limits::kMaxFrames || steps * points > static_cast<double>(kAllPoints))
+    return job.frames;
   std::vector<FrameNumber> frames;
   for (int frame = static_cast<int>(std::floor(*first)); frame < *last + step; frame += step)
     frames.emplace_back(frame);
@@ -119,11 +120,12 @@ std::vector<FrameNumber> measured_frames(const JobSpec& job, const Scene& scene)
 int measure_max_px(const JobSpec& job, const Scene& scene) {
   float largest = 0;
   const std::vector<FrameNumber> frames = measured_frames(job, scene);
+  const std::size_t points = std::min(kScenePoints, kAllPoints / frames.size());
   Pose before = pose_at(scene, job, frames.front().value());
   for (const FrameNumber frame : frames) {
     Pose now = pose_at(scene, job, frame.value());
     StepMeter meter(now.camera, before.camera, job.image.rendered());
-    add_meshes(scene, now, before, meter);
+    add_meshes(scene, now, before, points, meter);
     if (job.scene.ground) add_ground(job, now.camera, meter);
     largest = std::max(largest, meter.largest());
     before = std::move(now);
