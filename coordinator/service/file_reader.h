@@ -32,6 +32,8 @@ struct FileToRead {
   std::vector<Digest> expected = {};
   /// How it stood when it had the first of these: then it is not read.
   std::optional<FileStamp> known = {};
+  /// Whether it is one is seen also where no digest is expected.
+  bool is_frame = false;
 };
 
 /// Files of one request, in its order.

@@ -70,6 +70,7 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
     }
     if (verdict.state == FileState::unknown) {
       FileToRead file{path};
+      file.is_frame = true;
       for (const BlobRef& image : images) file.expected.push_back(image.digest);
       odd.unread.push_back(std::move(file));
     } else if (verdict.state == FileState::unreadable) {

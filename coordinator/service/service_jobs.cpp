@@ -25,9 +25,10 @@ Status expect_folder(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder, error);
   const bool is_wrong = error == std::errc::not_a_directory || error == std::errc::file_exists ||
                         error == std::errc::too_many_symbolic_link_levels;
-  if (!is_wrong || std::filesystem::is_directory(folder)) return {};
-  return Error{ErrorKind::io, fmt::format("{}: the output folder cannot be made: {}",
-                                          folder.string(), error.message())};
+  const std::string why = error.message();
+  if (!is_wrong || std::filesystem::is_directory(folder, error)) return {};
+  return Error{ErrorKind::io,
+               fmt::format("{}: the output folder cannot be made: {}", folder.string(), why)};
 }
 
 }  // namespace
