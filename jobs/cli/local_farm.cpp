@@ -75,16 +75,17 @@ Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
   LocalFarm farm(options, options.listen.empty() ? draw_endpoint() : options.listen,
                  std::move(lock));
   BATON_TRY(farm.start_coordinator(coordinator));
-  std::vector<std::string> command{worker,
-                                   "--coordinator",
-                                   farm.endpoint_,
-                                   "--threads",
-                                   std::to_string(options.threads_per_worker),
-                                   "--memory",
-                                   std::to_string(memory_mib_of_each(options))};
-  if (!options.isa.empty()) command.insert(command.end(), {"--isa", options.isa});
-  for (int i = 1; i <= options.workers; ++i)
-    BATON_TRY(farm.add_member(fmt::format("worker-{}", i), command));
+  for (int i = 1; i <= options.workers; ++i) {
+    std::vector<std::string> command{worker,
+                                     "--coordinator",
+                                     farm.endpoint_,
+                                     "--threads",
+                                     std::to_string(options.threads_per_worker),
+                                     "--memory",
+                                     std::to_string(memory_mib_of_each(options))};
+    if (!options.isa.empty()) command.insert(command.end(), {"--isa", options.isa});
+    BATON_TRY(farm.add_member(fmt::format("worker-{}", i), std::move(command)));
+  }
   return farm;
 }
 
