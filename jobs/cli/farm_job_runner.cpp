@@ -65,6 +65,13 @@ Result<JobSummary> FarmJobRunner::ask(Open& job, const JobSpec& spec) {
   if (!shown) return stopped();
   const JobDetail* const detail = &shown->detail;
   const JobSummary& summary = detail->summary;
+  if (shown->lacks_renderer) {
+    // Left by another program or machine: it begins again.
+    BATON_ASSIGN(std::string document, make_job_document(spec));
+    BATON_TRY(ask_farm<JobAccepted>(*farm_, *client_, signals_,
+                                    SubmitJob{std::move(document), /*restart=*/true}));
+    return summary;
+  }
   if (!detail->waits.empty() && job.waits.empty())
     spdlog::warn("run '{}' seed {} waits for {}", spec.name, spec.seed, detail->waits);
   job.waits = detail->waits;

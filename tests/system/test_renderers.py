@@ -73,6 +73,14 @@ def the_one_command_says_so(programs, folder):
     check_says(done.stderr, "renders as what is done was rendered", "--restart")
     programs.run("baton", *command, sets[-1])
 
+    # With --restart it is all by the other one, whoever of worker and job comes first.
+    (folder / "frames/frame.0002.exr").unlink()
+    programs.run("baton", *command, sets[0], "--restart")
+    witness = folder / "witness"
+    programs.render(make(witness, sampling={"numCandidates": 512, "numDistributions": 48}), witness / "work",
+                    extra=("--isa", sets[0]))
+    check_equal(programs.pixels(folder / "frames"), programs.pixels(witness / "frames"), "pixels")
+
 
 def a_set_that_is_not_there_is_said(programs, folder):
     done = programs.run("baton-worker", "--isa", "avx1024", "--coordinator", "tcp://127.0.0.1:1", expect=USAGE)

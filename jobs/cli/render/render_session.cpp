@@ -118,13 +118,17 @@ Result<std::optional<ShownJob>> RenderSession::follow(const JobId& job, FrameShe
 /// Renders the job as it is.
 Result<std::optional<ShownJob>> RenderSession::render_sweeps(
     const JobSpec& job, bool restart, FrameSheet& sheet, const std::function<bool()>& interrupted) {
-  BATON_ASSIGN(std::string document, make_job_document(job));
-  BATON_ASSIGN(
-      const std::optional<JobAccepted> accepted,
-      ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{std::move(document), restart}));
-  if (!accepted) return std::optional<ShownJob>();
-  fmt::print(stderr, "{}", accepted->plan);
-  return follow(accepted->identity.id, sheet, interrupted);
+  BATON_ASSIGN(const std::string document, make_job_document(job));
+  for (;;) {
+    BATON_ASSIGN(const std::optional<JobAccepted> accepted,
+                 ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{document, restart}));
+    if (!accepted) return std::optional<ShownJob>();
+    fmt::print(stderr, "{}", accepted->plan);
+    BATON_ASSIGN(std::optional<ShownJob> shown, follow(accepted->identity.id, sheet, interrupted));
+    // By what the workers render is known once they are there: then what they cannot go on with is
+    // begun again.
+    if (!restart || !shown || !shown->lacks_renderer) return shown;
+  }
 }
 
 Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart,
