@@ -199,8 +199,8 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
     if (!claim.job->renderer.empty())
       actions.push_back(RecordRenderer{event.lease.job, claim.job->renderer});
   }
-  end_lease(event.lease.job, claim.task, LeaseEnd::done, {}, actions);
   actions.push_back(RecordCompletion{event.lease.job, std::move(completion)});
+  end_lease(event.lease.job, claim.task, LeaseEnd::done, {}, actions);
   if (is_equal) end_if_finished(event.lease.job, *claim.job, actions);
 }
 

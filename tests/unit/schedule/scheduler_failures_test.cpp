@@ -8,6 +8,7 @@ namespace baton {
 namespace {
 
 using namespace testing_farm;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -48,9 +49,35 @@ TEST_F(SchedulerTest, AGrantThatNeverArrivedIsFoundByTheHeartbeat) {
 
 TEST_F(SchedulerTest, AWorkerThatIntroducesItselfAgainKeepsWhatItNames) {
   const auto held = farm.ask("a", 2);
-  EXPECT_THAT(farm.step(WorkerJoined{"a", {held[0].lease}}), IsEmpty());
+  // What it does not name is told to have ended; nothing else follows.
+  const std::vector<Action> actions = farm.step(WorkerJoined{"a", {held[0].lease}});
+  ASSERT_THAT(actions, SizeIs(1));
+  EXPECT_EQ(std::get<TellLeaseEnd>(actions.front()).end, LeaseEnd::lost);
   EXPECT_EQ(farm.progress().tasks_leased, 1u);
   EXPECT_THAT(all_of<RecordCompletion>(farm.finish(held[0])), SizeIs(1));
+}
+
+// What is done of a job was done by one renderer; others get none of its tasks.
+TEST_F(SchedulerTest, OnlyWhoRendersAlikeGoesOn) {
+  farm.step(WorkerJoined{"a", {}, "AVX2"});
+  const auto held = farm.ask("a", 2);
+  const std::vector<Action> actions = farm.finish(held[0]);
+  const auto recorded = all_of<RecordRenderer>(actions);
+  ASSERT_THAT(recorded, SizeIs(1));
+  EXPECT_EQ(recorded.front().renderer, "AVX2");
+  EXPECT_THAT(all_of<RecordRenderer>(farm.finish(held[1])), SizeIs(0)) << "told once";
+
+  farm.step(WorkerLeft{"a"});
+  farm.step(WorkerLeft{"b"});
+  farm.step(WorkerJoined{"c", {held[1].lease}, "SSE4"});
+  EXPECT_THAT(farm.ask("c", 1), SizeIs(0));
+  EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now),
+              AllOf(HasSubstr("with AVX2"), HasSubstr("render with SSE4"), HasSubstr("--isa")));
+  // Where it does not matter, anybody goes on.
+  farm.step(WorkerJoined{"d", {}});
+  EXPECT_THAT(farm.ask("d", 1), SizeIs(1));
+  farm.step(WorkerJoined{"e", {}, "AVX2"});
+  EXPECT_EQ(farm.scheduler.waits_for(farm.job, farm.now), "");
 }
 
 // Sixteen preemptions are no failure of the task, but may be its doing: somebody should look.
