@@ -123,8 +123,9 @@ Result<std::map<FarmEventKind, EventSum>> Journal::event_sums(const JobId& job) 
 
 Status Journal::forget_events(std::int64_t most, std::int64_t until_ms) {
   BATON_ASSIGN(SqlStatement query,
-               database_.prepare("SELECT max(sequence) FROM events WHERE sequence <= "
-                                 "(SELECT max(sequence) FROM events) - ?1 OR time_ms < ?2"));
+               database_.prepare("SELECT max(sequence) FROM events WHERE (sequence <= "
+                                 "(SELECT max(sequence) FROM events) - ?1 OR time_ms < ?2) AND "
+                                 "sequence < (SELECT max(sequence) FROM events)"));
   BATON_ASSIGN(const bool row, query.bind(most).bind(until_ms).step());
   const std::int64_t last = row ? query.integer(0) : 0;
   if (last == 0) return {};

@@ -75,7 +75,9 @@ inline constexpr const char* kSchema = R"sql(
 /// `renderers`: by what the tasks of a job were done that are done.
 /// Where other tables say `job`, they mean the digest of a document: a version. `versions` says of
 /// which job (JobId) it is the n-th, `identities` when what happened to that job. `events` is
-/// appended to alone (FarmEvent); of those that are old, `event_sums` keeps count and seconds.
+/// appended to alone (FarmEvent), without an index, which would cost more than it saves; its last
+/// row stays, so that no number is given twice. Of those that are old, `event_sums` keeps count and
+/// seconds.
 inline constexpr const char* kLaterTables = R"sql(
   CREATE TABLE IF NOT EXISTS frame_files (
     job TEXT NOT NULL, frame INTEGER NOT NULL, digest TEXT NOT NULL,
@@ -91,11 +93,10 @@ inline constexpr const char* kLaterTables = R"sql(
     id TEXT PRIMARY KEY, submitted_ms INTEGER NOT NULL DEFAULT 0,
     started_ms INTEGER NOT NULL DEFAULT 0, ended_ms INTEGER NOT NULL DEFAULT 0) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS events (
-    sequence INTEGER PRIMARY KEY AUTOINCREMENT, time_ms INTEGER NOT NULL, kind INTEGER NOT NULL,
+    sequence INTEGER PRIMARY KEY, time_ms INTEGER NOT NULL, kind INTEGER NOT NULL,
     actor TEXT NOT NULL, job TEXT NOT NULL,
     task INTEGER, first_frame INTEGER, last_frame INTEGER, tile INTEGER, attempt INTEGER,
     worker TEXT NOT NULL, reason TEXT NOT NULL, seconds REAL NOT NULL);
-  CREATE INDEX IF NOT EXISTS events_by_job ON events (job);
   CREATE TABLE IF NOT EXISTS event_sums (
     job TEXT NOT NULL, kind INTEGER NOT NULL, count INTEGER NOT NULL, seconds REAL NOT NULL,
     PRIMARY KEY (job, kind)) WITHOUT ROWID;
