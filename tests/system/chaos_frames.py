@@ -62,10 +62,10 @@ class FrameFaults:
         return False
 
     def mend(self, job):
-        """Clears the way for a paused job and lets it go on."""
+        """Clears the way for a paused job and lets it go on; what a disk that is read-only now keeps is cleared later."""
         for path in job.blocked:
             shutil.rmtree(path, ignore_errors=True)
-        job.blocked.clear()
+        job.blocked = [path for path in job.blocked if path.is_dir()]
         self.farm.baton("job", "resume", job.id, expect=None)
 
     def job_with_frames(self):
