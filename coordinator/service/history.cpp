@@ -7,14 +7,10 @@
 #include <utility>
 
 #include "common/base/limits.h"
+#include "common/base/utc.h"
 
 namespace baton {
 namespace {
-
-std::int64_t now_ms() {
-  using namespace std::chrono;
-  return duration_cast<milliseconds>(system_clock::now().time_since_epoch()).count();
-}
 
 double seconds_since(TimePoint time) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - time).count();

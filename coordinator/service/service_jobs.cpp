@@ -18,17 +18,16 @@
 namespace baton {
 namespace {
 
-/// Error, io: something that is no folder stands in its place, or of a folder around it. A disk
-/// that takes nothing now is waited for.
+/// Error, io: something that is no folder stands in its place, or in that of a folder around it.
+/// Nothing is made; a disk that takes nothing now is waited for.
 Status expect_folder(const std::filesystem::path& folder) {
   std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  const bool is_wrong = error == std::errc::not_a_directory || error == std::errc::file_exists ||
-                        error == std::errc::too_many_symbolic_link_levels;
-  const std::string why = error.message();
-  if (!is_wrong || std::filesystem::is_directory(folder, error)) return {};
-  return Error{ErrorKind::io,
-               fmt::format("{}: the output folder cannot be made: {}", folder.string(), why)};
+  std::filesystem::path there = folder;
+  while (!exists(std::filesystem::symlink_status(there, error)) && there.has_relative_path())
+    there = there.parent_path();
+  if (is_directory(std::filesystem::status(there, error))) return {};
+  return Error{ErrorKind::io, fmt::format("{}: the output folder cannot be made: {} is no folder",
+                                          folder.string(), there.string())};
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <ctime>
 #include <string_view>
@@ -29,11 +28,6 @@ std::string utc_text(std::int64_t time_ms) {
 std::string utc_iso(std::int64_t time_ms) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z",
                      fmt::gmtime(static_cast<std::time_t>(time_ms / 1000)), time_ms % 1000);
-}
-
-std::int64_t now_ms() {
-  using namespace std::chrono;
-  return duration_cast<milliseconds>(system_clock::now().time_since_epoch()).count();
 }
 
 Result<std::int64_t> parse_since(const std::string& text, std::int64_t now) {

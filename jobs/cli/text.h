@@ -16,10 +16,9 @@ std::string utc_text(std::int64_t time_ms);
 /// "2026-11-28T13:20:46.123Z", as ISO 8601 has it.
 std::string utc_iso(std::int64_t time_ms);
 
-/// Milliseconds since 1970, UTC.
-std::int64_t now_ms();
-/// The time, as now_ms(), that "30s", "15m", "2h" or "3d" before `now` means, or a date with or
-/// without a time of day, UTC: "2026-11-28", "2026-11-28T13:20:46". Error, usage: neither.
+/// The time, in milliseconds since 1970, that "30s", "15m", "2h" or "3d" before `now` means, or a
+/// date with or without a time of day, UTC: "2026-11-28", "2026-11-28T13:20:46". Error, usage:
+/// neither.
 Result<std::int64_t> parse_since(const std::string& text, std::int64_t now);
 
 /// "exposure +1.5 stops".

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "common/base/limits.h"
+#include "common/base/utc.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/text.h"

@@ -11,22 +11,15 @@
 #include <string>
 
 #include "common/scene/mesh_loader.h"
+#include "tests/support/mesh_area.h"
 #include "tests/support/mesh_files.h"
 
 namespace baton {
 namespace {
 
+using test::area_of;
 using test::write_test_file;
 using testing::HasSubstr;
-
-double area_of(const TriangleMesh& mesh) {
-  double area = 0;
-  for (const auto& t : mesh.triangles)
-    area += length(cross(mesh.positions[t[1]] - mesh.positions[t[0]],
-                         mesh.positions[t[2]] - mesh.positions[t[0]])) /
-            2;
-  return area;
-}
 
 Result<TriangleMesh> load(const std::string& extension, const std::string& text) {
   return load_mesh(write_test_file("text." + extension, text), false);

@@ -9,22 +9,15 @@
 #include "common/scene/mesh_loader.h"
 #include "common/scene/scene.h"
 #include "tests/support/gltf_jobs.h"
+#include "tests/support/mesh_area.h"
 
 namespace baton {
 namespace {
 
+using test::area_of;
 using test::write_test_file;
 using testing::HasSubstr;
 using Corners = std::vector<Position>;
-
-double area_of(const TriangleMesh& mesh) {
-  double area = 0;
-  for (const auto& t : mesh.triangles)
-    area += length(cross(mesh.positions[t[1]] - mesh.positions[t[0]],
-                         mesh.positions[t[2]] - mesh.positions[t[0]])) /
-            2;
-  return area;
-}
 
 /// Of a polygon in a plane z = const.
 double area_of(const Corners& c) {
