@@ -61,6 +61,9 @@ struct MethodTraits {
   bool asks_neighbors = false;
   /// Markov chains move and resample its samples.
   bool moves_samples = false;
+  /// Share of the candidates of the environment that goes by capped radiance (EnvironmentMap): for
+  /// those who learn that a lamp is hidden.
+  float capped_light = 0;
   /// SamplingSpec::mis_compensation may leave dim light to the BRDF's samples.
   bool compensates = false;
   /// It tells the variance of each pixel.

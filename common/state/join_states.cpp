@@ -27,6 +27,20 @@ std::size_t pixel_at(const PixelRect& rect, std::int32_t x, std::int32_t y) {
          static_cast<std::size_t>(x - rect.x0);
 }
 
+/// Copies what blocks carry, each from the part that it lies in.
+void copy_blocks(std::span<const SampleState* const> parts, SampleState& to) {
+  if (to.block_planes.empty()) return;
+  const PixelBlocks blocks(to.rect);
+  for (std::size_t block = 0; block < blocks.count(); ++block) {
+    const PixelRect pixels = blocks.pixels(block);
+    for (const SampleState* const part : parts) {
+      if (!part->rect.contains(pixels)) continue;
+      to.copy_block(*part, PixelBlocks(part->rect).at(pixels.x0, pixels.y0), block);
+      break;
+    }
+  }
+}
+
 }  // namespace
 
 Result<SampleState> join_states(std::span<const SampleState* const> parts, const PixelRect& rect,
@@ -58,6 +72,7 @@ Result<SampleState> join_states(std::span<const SampleState* const> parts, const
       num_covered += shared.x1 - shared.x0;
     }
   }
+  copy_blocks(parts, joined);
   if (num_covered != rect.area())
     return fail(fmt::format("they cover {} of {} pixels", num_covered, rect.area()));
   return joined;

@@ -9,20 +9,18 @@
 namespace baton {
 namespace {
 
-constexpr SectionTag kSummary{'V', 'I', 'S', 'S'};
-constexpr SectionTag kMasks{'V', 'I', 'S', 'M'};
-constexpr SectionTag kCells{'V', 'I', 'S', 'C'};
+constexpr SectionTag kMasks{'B', 'L', 'K', 'M'};
+constexpr SectionTag kCells{'B', 'L', 'K', 'C'};
 constexpr SectionTag kLightNoise{'N', 'O', 'I', 'S'};
 constexpr SectionTag kLobeNoise{'N', 'O', 'I', 'L'};
-/// Sizes of their elements in bytes.
-constexpr std::size_t kCellStride = sizeof(VisibilityCell);
-constexpr std::size_t kSummaryStride = 2 * kCellStride;
+constexpr std::size_t kNoiseStride = sizeof(std::uint16_t);
 
-/// Which bins are not 0: bit i is bin i.
+/// Which bins of 64 have seen a ray: bit i is bin i.
 using BinMask = std::uint64_t;
-static_assert(8 * sizeof(BinMask) == VisibilityBins::kCount);
+constexpr std::size_t kBinsOfMask = 8 * sizeof(BinMask);
+constexpr std::size_t kMasksOfBlock = BlockMemory::kCount / kBinsOfMask;
 
-/// The cells of a value for each pixel.
+/// The values of a section, one after the other.
 struct Column {
   const std::byte* data = nullptr;
   template <class T>
@@ -41,7 +39,7 @@ Result<Column> column(const StateReader& from, const SectionTag& tag, std::size_
 /// The noises of one kind are upper halves of floats that are finite and not negative.
 Result<Column> noises_of(const StateReader& from, const SectionTag& tag) {
   constexpr std::uint16_t kLargest = 0x7F7F;  // upper half of the largest float
-  BATON_ASSIGN(const Column noises, column(from, tag, from.pixels().size() * kCellStride));
+  BATON_ASSIGN(const Column noises, column(from, tag, from.pixels().size() * kNoiseStride));
   for (std::size_t i = 0; i < from.pixels().size(); ++i) {
     const auto value = noises.at<std::uint16_t>(i);
     if (value <= kLargest) continue;
@@ -51,96 +49,111 @@ Result<Column> noises_of(const StateReader& from, const SectionTag& tag) {
   return noises;
 }
 
+/// The first pixel of a block of the tile, row by row.
+std::size_t first_pixel(const PixelRect& rect, std::size_t block) {
+  const PixelRect pixels = PixelBlocks(rect).pixels(block);
+  return static_cast<std::size_t>((pixels.y0 - rect.y0) * rect.width() + pixels.x0 - rect.x0);
+}
+
 }  // namespace
 
 std::vector<std::size_t> MemoryFormat::pixel_bytes(std::int32_t num_particles,
                                                    std::int32_t num_populations) const {
   std::vector<std::size_t> sizes = SampleFormat::pixel_bytes(num_particles, num_populations);
-  sizes.push_back(sizeof(PixelMemory));
+  sizes.push_back(sizeof(PixelNoise));
   return sizes;
 }
 
-std::size_t MemoryFormat::most_stored_bytes(std::int32_t num_particles,
-                                            std::int32_t num_populations) const {
-  return SampleFormat::most_stored_bytes(num_particles, num_populations) - sizeof(PixelMemory) +
-         PixelMemory::kMaxStoredBytes;
+std::size_t MemoryFormat::most_stored_block_bytes() const {
+  return kMasksOfBlock * sizeof(BinMask) + sizeof(BlockMemory);
 }
 
 std::vector<SectionTag> MemoryFormat::tags() const {
   std::vector<SectionTag> tags = SampleFormat::tags();
-  tags.insert(tags.end(), {kSummary, kMasks, kCells, kLightNoise, kLobeNoise});
+  tags.insert(tags.end(), {kMasks, kCells, kLightNoise, kLobeNoise});
   return tags;
 }
 
 void MemoryFormat::encode(const SampleState& state, StateWriter& out) const {
   SampleFormat::encode(state, out);
-  const std::span<const PixelMemory> memories = memory_plane(state);
-  ByteWriter summaries, masks, cells, light_noise, lobe_noise;
-  for (const std::size_t pixel : out.pixels()) {
-    const PixelMemory& memory = memories[pixel];
-    summaries.put(memory.all_rays);
-    summaries.put(memory.outcomes);
-    light_noise.put(memory.light_noise);
-    lobe_noise.put(memory.lobe_noise);
-    if (!memory.has_bins()) continue;
-    BinMask mask = 0;
-    VisibilityBins reached;
-    std::size_t count = 0;
-    for (std::size_t bin = 0; bin < VisibilityBins::kCount; ++bin) {  // no branch
-      const VisibilityCell cell = memory.bins.cells[bin];
-      reached.cells[count] = cell;
-      count += cell != 0 ? 1 : 0;
-      mask |= BinMask{cell != 0} << bin;
+  ByteWriter masks, cells, light_noise, lobe_noise;
+  for (const BlockMemory& memory : memory_plane(state)) {
+    for (std::size_t first = 0; first < BlockMemory::kCount; first += kBinsOfMask) {
+      std::array<VisibilityCell, kBinsOfMask> seen;
+      BinMask mask = 0;
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < kBinsOfMask; ++i) {  // no branch
+        const VisibilityCell cell = memory.cells[first + i];
+        seen[count] = cell;
+        count += cell.seen != 0 ? 1 : 0;
+        mask |= BinMask{cell.seen != 0} << i;
+      }
+      masks.put(mask);
+      cells.put_raw(std::as_bytes(std::span(seen).first(count)));
     }
-    masks.put(mask);
-    cells.put_raw(std::as_bytes(std::span(reached.cells).first(count)));
   }
-  out.add(kSummary, kSummaryStride, summaries.take());
+  const std::span<const PixelNoise> noises = noise_plane(state);
+  for (const std::size_t pixel : out.pixels()) {
+    light_noise.put(noises[pixel].light);
+    lobe_noise.put(noises[pixel].lobes);
+  }
   out.add(kMasks, 1, masks.take());
-  out.add(kCells, kCellStride, cells.take());
-  out.keep_plain();
-  out.add(kLightNoise, kCellStride, light_noise.take());
-  out.add(kLobeNoise, kCellStride, lobe_noise.take());
+  out.add(kCells, sizeof(VisibilityCell), cells.take());
+  out.add(kLightNoise, kNoiseStride, light_noise.take());
+  out.add(kLobeNoise, kNoiseStride, lobe_noise.take());
 }
 
 Status MemoryFormat::decode(const StateReader& from, SampleState& state) const {
   BATON_TRY(SampleFormat::decode(from, state));
-  const std::vector<std::size_t>& pixels = from.pixels();
-
-  // Summaries first: they say who has bins, and the masks how many.
-  BATON_ASSIGN(const Column summaries, column(from, kSummary, pixels.size() * kSummaryStride));
-  std::size_t num_masks = 0;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const auto outcomes = summaries.at<std::uint16_t>(2 * i + 1);
-    if (outcomes > PixelMemory::kSawBoth) {
-      return from.wrong_value(kSummary, pixels[i],
-                              fmt::format("outcomes {}, expected 0 to 3", outcomes));
-    }
-    num_masks += outcomes == PixelMemory::kSawBoth ? 1 : 0;
-  }
+  const std::size_t num_masks = state.num_blocks() * kMasksOfBlock;
   BATON_ASSIGN(const Column masks, column(from, kMasks, num_masks * sizeof(BinMask)));
   std::size_t num_cells = 0;
   for (std::size_t i = 0; i < num_masks; ++i)
     num_cells += static_cast<std::size_t>(std::popcount(masks.at<BinMask>(i)));
-  BATON_ASSIGN(const Column cells, column(from, kCells, num_cells * kCellStride));
+  BATON_ASSIGN(const Column cells, column(from, kCells, num_cells * sizeof(VisibilityCell)));
   BATON_ASSIGN(const Column light, noises_of(from, kLightNoise));
   BATON_ASSIGN(const Column lobes, noises_of(from, kLobeNoise));
 
-  std::size_t next_mask = 0, next_cell = 0;
-  const std::span<PixelMemory> memories = memory_plane(state);
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    PixelMemory& memory = memories[pixels[i]];
-    memory.all_rays = summaries.at<VisibilityCell>(2 * i);
-    memory.outcomes = summaries.at<std::uint16_t>(2 * i + 1);
-    memory.light_noise = light.at<std::uint16_t>(i);
-    memory.lobe_noise = lobes.at<std::uint16_t>(i);
-    if (!memory.has_bins()) continue;
-    for (BinMask left = masks.at<BinMask>(next_mask++); left != 0; left &= left - 1) {
-      memory.bins.cells[static_cast<std::size_t>(std::countr_zero(left))] =
-          cells.at<VisibilityCell>(next_cell++);
+  std::size_t next_cell = 0;
+  const std::span<BlockMemory> memories = memory_plane(state);
+  for (std::size_t i = 0; i < num_masks; ++i) {
+    const std::size_t block = i / kMasksOfBlock, first = i % kMasksOfBlock * kBinsOfMask;
+    for (BinMask left = masks.at<BinMask>(i); left != 0; left &= left - 1) {
+      const auto cell = cells.at<VisibilityCell>(next_cell++);
+      if (cell.seen == 0 || cell.free > cell.seen) {
+        return from.wrong_value(kCells, first_pixel(state.rect, block),
+                                fmt::format("{} of {} rays are free, expected some, and no more "
+                                            "free ones than there are",
+                                            cell.free, cell.seen));
+      }
+      memories[block].cells[first + static_cast<std::size_t>(std::countr_zero(left))] = cell;
     }
   }
+  const std::span<PixelNoise> noises = noise_plane(state);
+  for (std::size_t i = 0; i < from.pixels().size(); ++i)
+    noises[from.pixels()[i]] = {light.at<std::uint16_t>(i), lobes.at<std::uint16_t>(i)};
   return {};
+}
+
+void MemoryFormat::inherit_block(std::span<const BlockSource> sources, SampleState& state,
+                                 std::size_t block) const {
+  BlockMemory& memory = memory_plane(state)[block];
+  std::uint32_t of_all = 0;
+  for (const BlockSource& source : sources) of_all += static_cast<std::uint32_t>(source.num_pixels);
+  // Fixed point, rounded down: no bin gets more free rays than rays.
+  std::array<std::uint32_t, BlockMemory::kCount> seen{}, free{};
+  for (const BlockSource& source : sources) {
+    const BlockMemory& old = memory_plane(*source.state)[source.block];
+    const auto share = static_cast<std::uint32_t>(source.num_pixels) * (1u << 15) / of_all;
+    for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
+      seen[i] += share * old.cells[i].seen;
+      free[i] += share * old.cells[i].free;
+    }
+  }
+  for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
+    memory.cells[i] = {static_cast<std::uint8_t>(seen[i] >> 16),
+                       static_cast<std::uint8_t>(free[i] >> 16)};
+  }
 }
 
 const MemoryFormat& memory_format() {

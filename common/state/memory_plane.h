@@ -2,32 +2,46 @@
 
 #include <span>
 
-#include "common/state/pixel_memory.h"
+#include "common/state/block_memory.h"
 #include "common/state/sample_planes.h"
 
 namespace baton {
 
-/// What pixels remember of their rays and light, beside Lns and, if any, samples. In a file a pixel
-/// has its summary and noise, and the bins if its rays have disagreed.
+/// What blocks of pixels remember of their rays, and pixels of the noise of their light, beside Lns
+/// and, if any, samples. In a file a block has the bins that have seen a ray.
 class MemoryFormat final : public SampleFormat {
  public:
   std::int32_t fewest_particles() const override { return 0; }
   std::vector<std::size_t> pixel_bytes(std::int32_t num_particles,
                                        std::int32_t num_populations) const override;
-  std::size_t most_stored_bytes(std::int32_t num_particles,
-                                std::int32_t num_populations) const override;
+  std::vector<std::size_t> block_bytes() const override { return {sizeof(BlockMemory)}; }
+  std::size_t most_stored_block_bytes() const override;
   std::vector<SectionTag> tags() const override;
   void encode(const SampleState& state, StateWriter& out) const override;
+  /// Errors, beside those of SampleFormat: more free rays in a bin than rays, a marked bin without
+  /// any, noise that is negative or not finite.
   Status decode(const StateReader& from, SampleState& state) const override;
+  /// The mean of the sources, of which rays of then count half: they were seen from elsewhere, or
+  /// past what has moved since.
+  void inherit_block(std::span<const BlockSource> sources, SampleState& state,
+                     std::size_t block) const override;
 };
 const MemoryFormat& memory_format();
 
 /// (pixels) of a state of memory_format().
-inline std::span<PixelMemory> memory_plane(SampleState& state) {
-  return state.planes[SampleFormat::kNumPlanes].values<PixelMemory>();
+inline std::span<PixelNoise> noise_plane(SampleState& state) {
+  return state.planes[SampleFormat::kNumPlanes].values<PixelNoise>();
 }
-inline std::span<const PixelMemory> memory_plane(const SampleState& state) {
-  return state.planes[SampleFormat::kNumPlanes].values<PixelMemory>();
+inline std::span<const PixelNoise> noise_plane(const SampleState& state) {
+  return state.planes[SampleFormat::kNumPlanes].values<PixelNoise>();
+}
+
+/// (blocks) of a state of memory_format().
+inline std::span<BlockMemory> memory_plane(SampleState& state) {
+  return state.block_planes[0].values<BlockMemory>();
+}
+inline std::span<const BlockMemory> memory_plane(const SampleState& state) {
+  return state.block_planes[0].values<BlockMemory>();
 }
 
 }  // namespace baton

@@ -83,7 +83,8 @@ Status decode_sources(const SectionFile& file, const std::string& name, const St
                       SampleState& state) {
   const auto populations = static_cast<std::size_t>(state.num_populations);
   const std::uint64_t bytes =
-      state.num_pixels() * format.most_stored_bytes(state.num_particles, state.num_populations);
+      state.num_pixels() * format.most_stored_bytes(state.num_particles, state.num_populations) +
+      state.num_blocks() * format.most_stored_block_bytes();
   if (bytes > limits::kMaxBlobBytes) {
     return Error{
         ErrorKind::bad_input,
@@ -134,6 +135,19 @@ const StateFormat& format_of(const SectionFile& file) {
   return sample_format();
 }
 
+/// Copies what `count` pixels or blocks have in a plane.
+void copy_values(const StatePlane& from, std::size_t first_from, StatePlane& to, std::size_t first,
+                 std::size_t count) {
+  const std::size_t bytes = to.each_bytes;
+  std::copy_n(from.bytes.data() + first_from * bytes, count * bytes,
+              to.bytes.data() + first * bytes);
+}
+
+void forget_values(std::vector<StatePlane>& planes, std::size_t at) {
+  for (StatePlane& plane : planes)
+    std::fill_n(plane.bytes.data() + at * plane.each_bytes, plane.each_bytes, std::byte{0});
+}
+
 }  // namespace
 
 void SampleState::resize(const StateFormat& new_format, const PixelRect& new_rect,
@@ -145,33 +159,39 @@ void SampleState::resize(const StateFormat& new_format, const PixelRect& new_rec
   num_particles = new_num_particles;
   num_populations = new_num_populations;
   source.assign(num_pixels() * static_cast<std::size_t>(num_populations), PixelSource::background);
-  const auto sizes = format->pixel_bytes(num_particles, num_populations);
-  planes.resize(sizes.size());
-  for (std::size_t i = 0; i < sizes.size(); ++i) {
-    planes[i].pixel_bytes = sizes[i];
-    planes[i].bytes.assign(num_pixels() * sizes[i], std::byte{0});
-  }
+  const auto make = [](std::vector<StatePlane>& made, const std::vector<std::size_t>& sizes,
+                       std::size_t count) {
+    made.resize(sizes.size());
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      made[i].each_bytes = sizes[i];
+      made[i].bytes.assign(count * sizes[i], std::byte{0});
+    }
+  };
+  make(planes, format->pixel_bytes(num_particles, num_populations), num_pixels());
+  make(block_planes, format->block_bytes(), num_blocks());
 }
 
 std::size_t SampleState::size_bytes() const {
   std::size_t sum = source.size() * sizeof(PixelSource);
   for (const StatePlane& plane : planes) sum += plane.bytes.size();
+  for (const StatePlane& plane : block_planes) sum += plane.bytes.size();
   return sum;
 }
 
 void SampleState::copy_pixels(const SampleState& from, std::size_t first_from, std::size_t first,
                               std::size_t count) {
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    const std::size_t bytes = planes[i].pixel_bytes;
-    std::copy_n(from.planes[i].bytes.data() + first_from * bytes, count * bytes,
-                planes[i].bytes.data() + first * bytes);
-  }
+  for (std::size_t i = 0; i < planes.size(); ++i)
+    copy_values(from.planes[i], first_from, planes[i], first, count);
 }
 
-void SampleState::forget_pixel(std::size_t pixel) {
-  for (StatePlane& plane : planes)
-    std::fill_n(plane.bytes.data() + pixel * plane.pixel_bytes, plane.pixel_bytes, std::byte{0});
+void SampleState::copy_block(const SampleState& from, std::size_t block_from, std::size_t block) {
+  for (std::size_t i = 0; i < block_planes.size(); ++i)
+    copy_values(from.block_planes[i], block_from, block_planes[i], block, 1);
 }
+
+void SampleState::forget_pixel(std::size_t pixel) { forget_values(planes, pixel); }
+
+void SampleState::forget_block(std::size_t block) { forget_values(block_planes, block); }
 
 void SampleState::set_source(std::size_t pixel, PixelSource new_source) {
   const auto count = static_cast<std::size_t>(num_populations);

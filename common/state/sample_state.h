@@ -11,6 +11,7 @@
 #include "common/base/result.h"
 #include "common/base/section_file.h"
 #include "common/job/time.h"
+#include "common/math/pixel_blocks.h"
 #include "common/math/pixel_rect.h"
 
 namespace baton {
@@ -29,11 +30,11 @@ enum class PixelSource : std::uint8_t {
 };
 inline constexpr std::size_t kNumPixelSources = 6;
 
-/// One kind of values that the pixels of a tile carry, as many bytes for each, pixel by pixel.
-/// What they mean its StateFormat says.
+/// One kind of values that the pixels of a tile carry, or its blocks (common/math/pixel_blocks.h),
+/// as many bytes for each, one after the other. What they mean its StateFormat says.
 struct StatePlane {
-  std::size_t pixel_bytes = 0;
-  std::vector<std::byte> bytes;  ///< (pixels) of pixel_bytes
+  std::size_t each_bytes = 0;
+  std::vector<std::byte> bytes;  ///< (pixels) or (blocks) of each_bytes
 
   /// All values; T: trivially copyable, aligned as `new` aligns at most.
   template <class T>
@@ -51,7 +52,7 @@ struct StatePlane {
 /// which only the method that made them reads (sample_planes.h and memory_plane.h have those of
 /// our methods). Pixels row by row inside `rect`. The surfaces are not stored: primary hits are a
 /// pure function of (job, frame, pixel, site) and are traced again. A background pixel carries
-/// nothing: every value is 0 there, and the file leaves it out.
+/// nothing of its own: every value is 0 there, and the file leaves it out.
 struct SampleState {
   Digest picture;  ///< picture_digest of the job
   Step step{};     ///< the samples are of this step
@@ -64,10 +65,14 @@ struct SampleState {
   std::vector<PixelSource> source;  ///< (pixels, K)
 
   const StateFormat* format = nullptr;
-  std::vector<StatePlane> planes;  ///< as StateFormat::pixel_bytes lists them
+  std::vector<StatePlane> planes;  ///< of the pixels, as StateFormat::pixel_bytes lists them
+  /// Of the blocks, as StateFormat::block_bytes lists them.
+  std::vector<StatePlane> block_planes;
 
   bool operator==(const SampleState&) const = default;
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
+  /// Blocks that have pixels in `rect`.
+  std::size_t num_blocks() const { return PixelBlocks(rect).count(); }
   /// Makes planes of that format, all zero, and forgets those that are there. new_num_populations
   /// divides new_num_particles.
   void resize(const StateFormat& new_format, const PixelRect& new_rect,
@@ -79,8 +84,12 @@ struct SampleState {
   /// same format, N and K.
   void copy_pixels(const SampleState& from, std::size_t first_from, std::size_t first,
                    std::size_t count);
+  /// Copies all that block `block_from` of `from` carries.
+  void copy_block(const SampleState& from, std::size_t block_from, std::size_t block);
   /// Lets a pixel carry nothing, all zero.
   void forget_pixel(std::size_t pixel);
+  /// Lets a block carry nothing, all zero.
+  void forget_block(std::size_t block);
   void set_source(std::size_t pixel, PixelSource new_source);
   /// What the pixel's populations say together.
   PixelSource latest_source(std::size_t pixel) const;

@@ -34,10 +34,10 @@ void StateWriter::gather(const SectionTag& tag, std::size_t stride, const StateP
     return;
   }
   Bytes payload;
-  payload.reserve(pixels_.size() * plane.pixel_bytes);
+  payload.reserve(pixels_.size() * plane.each_bytes);
   for (const std::size_t pixel : pixels_) {
     const ByteView row =
-        ByteView(plane.bytes).subspan(pixel * plane.pixel_bytes, plane.pixel_bytes);
+        ByteView(plane.bytes).subspan(pixel * plane.each_bytes, plane.each_bytes);
     payload.insert(payload.end(), row.begin(), row.end());
   }
   add(tag, stride, std::move(payload));
@@ -52,7 +52,7 @@ StateReader::StateReader(const SectionFile& file, const std::string& name, const
     : file_(file), name_(name), rect_(state.rect), pixels_(surface_pixels(state)) {}
 
 Status StateReader::scatter(const SectionTag& tag, StatePlane& plane) const {
-  const std::size_t size = plane.pixel_bytes;
+  const std::size_t size = plane.each_bytes;
   BATON_ASSIGN(const ByteView from, payload(tag, pixels_.size() * size));
   if (size == 0) return {};
   for (std::size_t i = 0; i < pixels_.size(); ++i)

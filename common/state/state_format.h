@@ -70,6 +70,10 @@ class StateFormat {
   /// Bytes of a pixel in each plane.
   virtual std::vector<std::size_t> pixel_bytes(std::int32_t num_particles,
                                                std::int32_t num_populations) const = 0;
+  /// Bytes of a block in each plane of the blocks.
+  virtual std::vector<std::size_t> block_bytes() const { return {}; }
+  /// Bytes of a block in a file before packing, at most.
+  virtual std::size_t most_stored_block_bytes() const { return 0; }
   /// Bytes of a pixel in a file before packing, at most, its source among them.
   virtual std::size_t most_stored_bytes(std::int32_t num_particles,
                                         std::int32_t num_populations) const;
@@ -85,6 +89,16 @@ class StateFormat {
   /// Moves what a pixel carries to other sites.
   virtual void move_to_sites(SampleState& /*state*/, std::size_t /*pixel*/,
                              const HeirOf& /*heir_of*/) const {}
+
+  /// A block of the frame before, and how many pixels of a block of now come from it.
+  struct BlockSource {
+    const SampleState* state;
+    std::size_t block;
+    std::int32_t num_pixels;
+  };
+  /// Fills what a block carries, all zero, where surfaces have moved. sources: not empty.
+  virtual void inherit_block(std::span<const BlockSource> /*sources*/, SampleState& /*state*/,
+                             std::size_t /*block*/) const {}
 };
 
 }  // namespace baton

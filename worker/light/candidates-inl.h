@@ -247,6 +247,7 @@ struct CandidateLanes {
   VF weight;
   VF per_target;        ///< weight / p~
   Vec3Lanes reflected;  ///< (f cos L)_rgb
+  VF inverse_density;   ///< of the map's table, in sr; past all bounds where there is none
 };
 
 HWY_INLINE void StoreCandidates(const CandidateLanes& c, std::size_t at,
@@ -281,8 +282,8 @@ HWY_INLINE void LightCandidates(const kernels::CandidateSource& from, const Use&
     const VF target = MeanLanes(reflected);
     const VF per_target = weigh(target, surface, f, light.now.density,
                                 static_cast<std::size_t>(counts.from_light) - i);
-    use(CandidateLanes{light.code, surface.site, hn::Mul(target, per_target), per_target,
-                       reflected},
+    use(CandidateLanes{light.code, surface.site, hn::Mul(target, per_target), per_target, reflected,
+                       light.inverse_density},
         i);
   });
 }
@@ -357,7 +358,10 @@ HWY_INLINE void BsdfCandidates(const kernels::CandidateSource& from, const Use& 
     const VF target = MeanLanes(reflected);
     const VF per_target =
         weigh(target, surface, f, light.density, static_cast<std::size_t>(counts.from_bsdf) - i);
-    use(CandidateLanes{code, surface.site, hn::Mul(target, per_target), per_target, reflected}, i);
+    const VF inverse_density = hn::Div(hn::Set(DF(), 1.0f), hn::Abs(light.density));
+    use(CandidateLanes{code, surface.site, hn::Mul(target, per_target), per_target, reflected,
+                       inverse_density},
+        i);
   });
 }
 

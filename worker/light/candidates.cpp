@@ -33,7 +33,8 @@ struct ReflectedLine {
   Vec3Lanes colors;  ///< sum of w (f cos L) / p~
 
   template <class AddColor>
-  HWY_INLINE void Add(VU /*code*/, VF /*weight*/, const AddColor& add_color) {
+  HWY_INLINE void Add(VU /*code*/, VF /*inverse_density*/, VF /*weight*/,
+                      const AddColor& add_color) {
     add_color(hn::Set(DF(), 1.0f), colors);
   }
   void BeginBsdf() {}

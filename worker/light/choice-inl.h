@@ -22,8 +22,8 @@ namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// Weighs the candidates from the presampled light of a pixel that sees diffuse surfaces alone:
-/// cosine times reflected light over density, and nothing else. line: has Add(code, weight,
-/// add_color), where add_color(share, sum) adds share w (f cos L)_rgb / p~ to a sum of colours, and
+/// cosine times reflected light over density, and nothing else. line: has Add(code,
+/// inverse_density, weight, add_color), where add_color(share, sum) adds share w (f cos L)_rgb / p~ to a sum of colours, and
 /// kHasColors: it keeps such a sum, `colors`, which the albedo is multiplied to once for all. A
 /// copy of the line that stays in registers is what adds.
 template <class Line>
@@ -57,12 +57,13 @@ HWY_INLINE void WeighDiffuse(const kernels::CandidateSource& from, Line& line) {
               const VF above = hn::Min(cosine, Dot(ng, light.direction));  // its sign alone counts
               MF live = hn::Gt(above, hn::Zero(d));
               if (i + hn::Lanes(d) > count) live = hn::And(live, hn::FirstN(d, count - i));
-              const VF each = hn::IfThenElseZero(live, hn::Mul(cosine, run.LoadInverse(i)));
+              const VF inverse = run.LoadInverse(i);
+              const VF each = hn::IfThenElseZero(live, hn::Mul(cosine, inverse));
               const auto add_color = [&](VF share, Vec3Lanes& sum) HWY_ATTR {
                 sum = AddScaled({light.now.r, light.now.g, light.now.b}, hn::Mul(each, share), sum);
               };
               const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
-              adding.Add(light.code, hn::Mul(each, reflected), add_color);
+              adding.Add(light.code, inverse, hn::Mul(each, reflected), add_color);
             }
             if constexpr (Line::kHasColors) {
               colors = AddProduct(Scale(kd, hn::Set(d, 3.0f)), adding.colors, colors);
@@ -86,7 +87,7 @@ HWY_INLINE void WeighCandidates(const kernels::CandidateSource& from,
   }
   Line adding = line;
   const auto add = [&](const CandidateLanes& c) BATON_IN_LOOP {
-    adding.Add(c.code, c.weight, [&](VF share, Vec3Lanes& sum) BATON_IN_LOOP {
+    adding.Add(c.code, c.inverse_density, c.weight, [&](VF share, Vec3Lanes& sum) BATON_IN_LOOP {
       sum = AddScaled(c.reflected, hn::Mul(c.per_target, share), sum);
     });
   };
@@ -105,7 +106,8 @@ struct WeightLine {
   RunningSums::End end;
 
   template <class AddColor>
-  HWY_INLINE void Add(VU /*code*/, VF weight, const AddColor& /*add_color*/) {
+  HWY_INLINE void Add(VU /*code*/, VF /*inverse_density*/, VF weight,
+                      const AddColor& /*add_color*/) {
     end.Add(weight);
   }
   void BeginBsdf() {}
@@ -123,7 +125,7 @@ class ChosenCandidates {
             hwy::RoundUpTo(static_cast<std::size_t>(from.counts.from_light), hn::Lanes(DF())))),
         from_bsdf_(from_bsdf) {}
 
-  /// Everything about the candidates; weight is left undefined.
+  /// All about the candidates but for weight and density, which are left undefined.
   HWY_INLINE CandidateLanes Evaluate(VI pick) const {
     const DI di;
     const auto from_bsdf = hn::Gt(pick, hn::Set(di, padded_light_ - 1));

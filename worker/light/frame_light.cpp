@@ -55,6 +55,7 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
       frames_(expand_sequence(job)),
       num_sets_(num_presampled_sets(std::int64_t{job.image.width} * job.image.height,
                                     job.quality.rounds)),
+      capped_share_(traits(job.sampling.method).capped_light),
       mixed_maps_(
           share, [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
       presampled_(
@@ -67,7 +68,7 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key,
                                                                      const HiddenCone& hidden) {
   return maps_->get(job_.environment.keys[static_cast<std::size_t>(key)].map, job_.environment,
-                    job_.sampling.mis_compensation, hidden);
+                    job_.sampling.mis_compensation, hidden, capped_share_);
 }
 
 Step LightSequence::first_with_texels_of(const EnvironmentFrame& frame) const {
@@ -93,8 +94,9 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
                     job_.environment.keys[static_cast<std::size_t>(frame.map_a)].map)};
   }
   return mixed_maps_.insert(name,
-                            std::make_shared<const EnvironmentMap>(*a, *b, frame.mix, frame.scale,
-                                                                   job_.sampling.mis_compensation));
+                            std::make_shared<const EnvironmentMap>(
+                                *a, *b, frame.mix, frame.scale, job_.sampling.mis_compensation,
+                                capped_share_));
 }
 
 HiddenCone LightSequence::hidden_in(const FrameSpec& frame) {

@@ -82,6 +82,7 @@ class LightSequence {
   std::vector<std::optional<HiddenCone>> cones_;  ///< (frames), of those that were asked for
   std::vector<FrameSpec> frames_;
   const std::int32_t num_sets_;  ///< sets of presampled light
+  const float capped_share_;     ///< of the tables of maps (EnvironmentMap)
   mutable std::mutex mutex_;
   /// By the first step that shows these texels, and what is hidden of them.
   LruCache<std::pair<Step, HiddenCone>, EnvironmentMap> mixed_maps_;

@@ -5,16 +5,17 @@
 namespace baton {
 
 Result<MapCache::MapPtr> MapCache::get(const std::string& path, const EnvironmentSpec& environment,
-                                       bool compensate, const HiddenCone& hidden) {
-  const Key key{path,  environment.filter, environment.scale, environment.max_width, compensate,
-                hidden};
+                                       bool compensate, const HiddenCone& hidden,
+                                       float capped_share) {
+  const Key key{path,       environment.filter, environment.scale, environment.max_width,
+                compensate, hidden,             capped_share};
   const std::lock_guard lock(reading_);
   if (MapPtr found = maps_.find(key)) return found;
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
   reports_.insert_or_assign({path, environment.scale},
                             report_map(path, image, environment.scale, environment.max_width));
   return maps_.insert(key, std::make_shared<const EnvironmentMap>(
-                               make_map(image, environment, compensate, hidden)));
+                               make_map(image, environment, compensate, hidden, capped_share)));
 }
 
 MapReport MapCache::report(const std::string& path, float scale) const {

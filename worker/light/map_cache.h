@@ -24,10 +24,10 @@ class MapCache {
   explicit MapCache(const MemorySharePtr& share)
       : maps_(share, [](const EnvironmentMap& map) { return map.size_bytes(); }) {}
 
-  /// The map of a file with the size and table that `environment`, `compensate` and `hidden` ask
-  /// for. Error: a map that cannot be read.
+  /// The map of a file with the size and table that `environment` and the other arguments, those
+  /// of EnvironmentMap, ask for. Error: a map that cannot be read.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
-                     const HiddenCone& hidden = {});
+                     const HiddenCone& hidden = {}, float capped_share = 0);
   /// What is known of a map that was got with this scale; nothing of a map that was not.
   MapReport report(const std::string& path, float scale) const;
 
@@ -39,6 +39,7 @@ class MapCache {
     int max_width;
     bool compensate;
     HiddenCone hidden;
+    float capped_share;
 
     auto operator<=>(const Key&) const = default;
   };

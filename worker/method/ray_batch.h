@@ -22,7 +22,7 @@ struct RayBatch {
   std::vector<float> r, g, b;         ///< u_j (f cos L)_rgb / p~
   std::vector<float> visibility;      ///< share of the pixel's Lns
   /// Handed back to the method: PixelRays::bin.
-  std::vector<std::uint8_t> tag;
+  std::vector<std::uint16_t> tag;
 
   void clear() {
     rays.clear();
@@ -116,7 +116,7 @@ class RayWriter {
 /// The traced rays of one pixel; at most 64.
 struct FoundRays {
   std::span<const std::uint32_t> sample;  ///< as RayBatch::sample
-  std::span<const std::uint8_t> tag;
+  std::span<const std::uint16_t> tag;
   std::uint64_t is_free = 0;  ///< bit by bit
 
   bool free(std::size_t i) const { return (is_free >> i & 1) != 0; }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/limits.h"
 
 namespace baton {
 
@@ -11,13 +10,7 @@ AdaptiveRounds::AdaptiveRounds(const JobSpec& job, const PixelRect& rect)
     : rect_(rect),
       rounds_(job.quality.rounds),
       threshold_(job.quality.adaptive_threshold),
-      columns_((rect.width() + limits::kAdaptiveBlock - 1) / limits::kAdaptiveBlock) {}
-
-std::size_t AdaptiveRounds::block_of(std::size_t pixel) const {
-  const auto width = static_cast<std::size_t>(rect_.width());
-  constexpr auto side = std::size_t{limits::kAdaptiveBlock};
-  return pixel / width / side * static_cast<std::size_t>(columns_) + pixel % width / side;
-}
+      blocks_(rect) {}
 
 RoundPixels AdaptiveRounds::pixels(Round round) const {
   const auto num_pixels = static_cast<std::size_t>(rect_.area());
@@ -25,7 +18,7 @@ RoundPixels AdaptiveRounds::pixels(Round round) const {
     return RoundPixels::all(num_pixels);
   RoundPixels taken;
   for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
-    const std::int32_t count = rounds_of_block_[block_of(pixel)];
+    const std::int32_t count = rounds_of_block_[blocks_.of(pixel)];
     if (round - Round(limits::kJudgingRounds) < count)
       taken.add(pixel, static_cast<double>(rounds_ - limits::kJudgingRounds) / count);
   }
@@ -35,11 +28,11 @@ RoundPixels AdaptiveRounds::pixels(Round round) const {
 void AdaptiveRounds::judge(const RoundMean& film) {
   if (!threshold_) return;
   const auto num_pixels = static_cast<std::size_t>(rect_.area());
-  const std::size_t num_blocks = block_of(num_pixels - 1) + 1;
+  const std::size_t num_blocks = blocks_.count();
   std::vector<double> squares(num_blocks), counts(num_blocks);
   for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
-    squares[block_of(pixel)] += film.squared_noise(pixel);
-    ++counts[block_of(pixel)];
+    squares[blocks_.of(pixel)] += film.squared_noise(pixel);
+    ++counts[blocks_.of(pixel)];
   }
   const std::int32_t most = rounds_ - limits::kJudgingRounds;
   rounds_of_block_.resize(num_blocks);

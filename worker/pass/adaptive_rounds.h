@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "common/job/job_spec.h"
+#include "common/base/limits.h"
+#include "common/math/pixel_blocks.h"
 #include "common/math/pixel_rect.h"
 #include "worker/pass/round_mean.h"
 #include "worker/pass/round_pixels.h"
@@ -21,26 +23,24 @@ namespace baton {
 /// weighs the first part by what that found, would be biased.)
 ///
 /// A block, since two rounds of one pixel say nothing of its noise: pixels that were clean by
-/// chance would stand out later. Blocks are counted from the corner of what is rendered, and tiles
-/// are whole numbers of blocks, so that no tiling shows.
+/// chance would stand out later. Blocks are those of the picture, and tiles are whole numbers of
+/// them, so that no tiling shows.
 class AdaptiveRounds {
  public:
   /// Plans the rounds of a tile. rect: its pixels.
   AdaptiveRounds(const JobSpec& job, const PixelRect& rect);
 
-  /// The pixels of a round of the step, below K, or negative in preroll; later rounds have
+  /// The pixels of a round of the step, [0, K); later rounds have
   /// no others than earlier ones. After the judging rounds only once judge() was called.
   RoundPixels pixels(Round round) const;
   /// film: the sums of the judging rounds. Does nothing where all pixels get all rounds.
   void judge(const RoundMean& film);
 
  private:
-  std::size_t block_of(std::size_t pixel) const;
-
   const PixelRect rect_;
   const std::int32_t rounds_;                  ///< K
   const std::optional<float> threshold_;       ///< T
-  const std::int32_t columns_;                 ///< blocks in a row
+  const PixelBlocksOf<limits::kAdaptiveBlock> blocks_;
   std::vector<std::int32_t> rounds_of_block_;  ///< after the judging ones; empty: all
 };
 

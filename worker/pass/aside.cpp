@@ -7,10 +7,14 @@ Rgb AsideSampler::sample(const PixelMethod& method, const PixelInput& input, con
   const SampleState& tile = pixel.tile;
   if (state_.format == tile.format && state_.num_particles == tile.num_particles) {
     state_.forget_pixel(0);
+    state_.forget_block(0);
   } else {
     state_.resize(*tile.format, {0, 0, 1, 1}, tile.num_particles, tile.num_populations);
   }
-  if (!aside.starts_afresh) state_.copy_pixels(tile, pixel.index, 0, 1);
+  if (!aside.starts_afresh) {
+    state_.copy_pixels(tile, pixel.index, 0, 1);
+    state_.copy_block(tile, PixelBlocks(tile.rect).of(pixel.index), 0);
+  }
   std::unique_ptr<TileSampler>& sampler = samplers_[&method];
   if (sampler == nullptr) sampler = method.start();
   sampler->begin_round(state_, false);

@@ -6,23 +6,24 @@
 
 namespace baton {
 
-void PixelStarts::begin(const PixelBatch& batch) {
-  first_ = batch.first;
+void PixelStarts::begin(const PixelBatch& batch, SampleState& state) {
   if (work_.at.history == nullptr) return;
   const StageTimer timer(work_.seconds.history);
-  work_.at.history->look_up(work_.at.surfaces, batch.first, batch.count, work_.at.frame);
+  work_.at.history->look_up(work_.at.surfaces, batch.slots, work_.at.frame);
+  if (!state.block_planes.empty())
+    work_.at.history->inherit_blocks(work_.at.surfaces, batch.slots, state);
 }
 
-bool PixelStarts::find(std::size_t slot, SampleState& state) {
+bool PixelStarts::find(std::size_t i, std::size_t slot, SampleState& state) {
   const TileSurfaces& surfaces = work_.at.surfaces;
   const std::size_t index = surfaces.pixels.index(slot);
   const bool sees_catcher = surfaces.first_surface(slot).is_catcher;
-  Found& found = found_[slot % 2];
+  Found& found = found_[i % 2];
   poison(found.old);
   found.history = PixelHistory::none;
   if (work_.at.history != nullptr) {
     found.history =
-        work_.at.history->take(slot - first_, index, work_.catchers_before, state, found.old);
+        work_.at.history->take(i, index, work_.catchers_before, state, found.old);
   } else if (work_.at.goes_on) {
     if (is_of_its_kind(sees_catcher, state, index)) {
       found.history = PixelHistory::same;
@@ -44,12 +45,12 @@ PixelHistory PixelStarts::with_old_albedo(std::size_t slot, OldSurfaces& old) {
   return PixelHistory::moved;
 }
 
-PixelStart PixelStarts::of(std::size_t slot) {
-  const Found& found = found_[slot % 2];
+PixelStart PixelStarts::of(std::size_t i) {
+  const Found& found = found_[i % 2];
   PixelStart start{.has_history = found.history != PixelHistory::none};
   if (found.history == PixelHistory::moved) start.old = &found.old;
   if (work_.at.history != nullptr)
-    start.neighbors = work_.at.history->neighbors(slot - first_, work_.catchers_before);
+    start.neighbors = work_.at.history->neighbors(i, work_.catchers_before);
   return start;
 }
 

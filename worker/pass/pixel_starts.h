@@ -13,13 +13,13 @@ class PixelStarts {
  public:
   PixelStarts(const FrameGeometry& geometry, RoundWork& work) : geometry_(geometry), work_(work) {}
 
-  /// Looks for the pixels of a batch in the frame before.
-  void begin(const PixelBatch& batch);
-  /// What the pixel in a slot of the batch, which sees a surface, carries in `state` becomes what
+  /// Looks for the pixels of a batch in the frame before, and fills their blocks in `state`.
+  void begin(const PixelBatch& batch, SampleState& state);
+  /// What pixel i of the batch, in `slot`, which sees a surface, carries in `state` becomes what
   /// the frame before left. Returns whether there is any.
-  bool find(std::size_t slot, SampleState& state);
+  bool find(std::size_t i, std::size_t slot, SampleState& state);
   /// Holds for the pixel that was found last or the one before it, until the next call of find().
-  PixelStart of(std::size_t slot);
+  PixelStart of(std::size_t i);
 
  private:
   struct Found {
@@ -30,8 +30,7 @@ class PixelStarts {
 
   const FrameGeometry& geometry_;
   RoundWork& work_;
-  std::size_t first_ = 0;       ///< slot of the batch's first pixel
-  std::array<Found, 2> found_;  ///< one for even slots, one for odd ones
+  std::array<Found, 2> found_;  ///< one for even numbers, one for odd ones
 };
 
 }  // namespace baton

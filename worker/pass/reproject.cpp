@@ -80,17 +80,17 @@ std::optional<Reprojection::Position> Reprojection::find_source(std::span<const 
   return source;
 }
 
-void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std::size_t count,
+void Reprojection::look_up(const TileSurfaces& surfaces, std::span<const std::uint32_t> slots,
                            const FrameSpec& frame) {
   const JobSpec& job = context_.job;
-  slots_.assign(count, {});
+  slots_.assign(slots.size(), {});
   old_pixels_.clear();
-  if (neighborhood_) neighborhood_->clear(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto [x, y] = surfaces.rect.place(surfaces.pixels.index(first + i));
+  if (neighborhood_) neighborhood_->clear(slots.size());
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    const auto [x, y] = surfaces.rect.place(surfaces.pixels.index(slots[i]));
     const Position pixel{x, y};
     Slot& slot = slots_[i];
-    slot.hits = surfaces.pixel(first + i).first(static_cast<std::size_t>(job.image.sites));
+    slot.hits = surfaces.pixel(slots[i]).first(static_cast<std::size_t>(job.image.sites));
     slot.key = pixel_key(job.seed, frame.number.value(), job.image.width, pixel.x, pixel.y,
                          frame.first_round);
     const std::optional<Position> source =
@@ -101,6 +101,44 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
     if (neighborhood_) neighborhood_->look_up(i, slot.hits, slot.key, source->x, source->y);
   }
   old_pixels_.trace();
+  for (Slot& slot : slots_) judge(slot);
+}
+
+/// What the pixel has of the one that it may come from.
+void Reprojection::judge(Slot& slot) const {
+  if (!slot.old) return;
+  const std::span<const SurfaceHit> old_hits = old_pixels_.hits(*slot.old);
+  // Where nothing has changed, everything stays as it is.
+  if (slot.same_pixel && see_the_same(old_hits, slot.hits)) {
+    slot.history = PixelHistory::same;
+  } else if (const std::optional<Inheritance> found = inherit(slot.hits, old_hits)) {
+    slot.history = PixelHistory::moved;
+    slot.inheritance = *found;
+  }
+}
+
+void Reprojection::inherit_blocks(const TileSurfaces& surfaces,
+                                  std::span<const std::uint32_t> slots, SampleState& state) const {
+  const PixelBlocks blocks(state.rect);
+  std::vector<StateFormat::BlockSource> sources;
+  for (std::size_t i = 0; i < slots.size();) {
+    const std::size_t block = blocks.of(surfaces.pixels.index(slots[i]));
+    sources.clear();
+    for (; i < slots.size() && blocks.of(surfaces.pixels.index(slots[i])) == block; ++i) {
+      if (slots_[i].history == PixelHistory::none) continue;
+      const OldPixels::Place& old = *slots_[i].old;
+      const std::size_t from = PixelBlocks(old.state->rect).of(old.index);
+      const auto known = std::ranges::find_if(sources, [&](const StateFormat::BlockSource& source) {
+        return source.state == old.state && source.block == from;
+      });
+      if (known != sources.end()) {
+        ++known->num_pixels;
+      } else {
+        sources.push_back({old.state, from, 1});
+      }
+    }
+    if (!sources.empty()) state.format->inherit_block(sources, state, block);
+  }
 }
 
 /// Whether a surface of now is one of then: the same object, the point of now on the tangent plane
@@ -162,33 +200,28 @@ std::uint8_t Reprojection::find_heir(std::span<const SurfaceHit> hits,
 }
 
 /// Copies all samples, each to a site that inherits it.
-void Reprojection::copy_samples(const Slot& slot, const Inheritance& inheritance, std::size_t pixel,
-                                SampleState& state) const {
+void Reprojection::copy_samples(const Slot& slot, std::size_t pixel, SampleState& state) const {
   state.copy_pixels(*slot.old->state, slot.old->index, pixel, 1);
   const Rng rng(slot.key, PassId::reproject);
   state.format->move_to_sites(state, pixel, [&](std::uint8_t site, std::size_t particle) {
-    const std::uint32_t heirs = inheritance.count[site];
+    const std::uint32_t heirs = slot.inheritance.count[site];
     const std::uint32_t k =
         heirs > 1 ? rng.bits(1, static_cast<std::uint32_t>(particle))[0] % heirs : 0;
-    return find_heir(slot.hits, inheritance, site, k);
+    return find_heir(slot.hits, slot.inheritance, site, k);
   });
 }
 
 PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, CatcherAlbedo& catchers,
                                 SampleState& state, OldSurfaces& old) const {
   const Slot& slot = slots_[i];
-  if (!slot.old) return PixelHistory::none;
-  const std::span<const SurfaceHit> old_hits = old_pixels_.hits(*slot.old);
-
-  // Where nothing has changed, everything stays as it is.
-  if (slot.same_pixel && see_the_same(old_hits, slot.hits)) {
+  if (slot.history == PixelHistory::none) return PixelHistory::none;
+  if (slot.history == PixelHistory::same) {
     state.copy_pixels(*slot.old->state, slot.old->index, pixel, 1);
     return PixelHistory::same;
   }
 
-  const std::optional<Inheritance> inheritance = inherit(slot.hits, old_hits);
-  if (!inheritance) return PixelHistory::none;
-  copy_samples(slot, *inheritance, pixel, state);
+  copy_samples(slot, pixel, state);
+  const std::span<const SurfaceHit> old_hits = old_pixels_.hits(*slot.old);
   const std::span<const SurfaceShading> old_shadings = old_pixels_.shadings(*slot.old);
   old.sites.clear(static_cast<int>(slot.hits.size()));
   for (std::size_t t = 0; t < slot.hits.size(); ++t) {
@@ -196,10 +229,10 @@ PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, CatcherAlbedo&
       old.sites.add_miss(static_cast<int>(t));
       continue;
     }
-    const std::size_t from = inheritance->from[t];
+    const std::size_t from = slot.inheritance.from[t];
     catchers.add_to(old.sites, static_cast<int>(t), before_, old_hits[from],
                     old_shadings.empty() ? nullptr : &old_shadings[from]);
-    old.log_share[t] = -std::log(static_cast<float>(inheritance->count[from]));
+    old.log_share[t] = -std::log(static_cast<float>(slot.inheritance.count[from]));
   }
   return PixelHistory::moved;
 }

@@ -33,28 +33,25 @@ class Reprojection {
   Reprojection(const RenderContext& context, const FrameGeometry& now, const FrameGeometry& before,
                std::span<const StatePtr> states);
 
-  /// Finds the history of `count` pixels of `surfaces` from `first` on. frame: the user's number.
-  void look_up(const TileSurfaces& surfaces, std::size_t first, std::size_t count,
+  /// Finds the history of pixels of `surfaces`, by their slots. frame: the user's number.
+  void look_up(const TileSurfaces& surfaces, std::span<const std::uint32_t> slots,
                const FrameSpec& frame);
-  /// Copies the samples that pixel first + i of the last look_up takes over to pixel `pixel` of
+  /// Fills what the blocks of these pixels carry, each from the blocks that its pixels come from.
+  /// slots: of the last look_up, the pixels of a block side by side.
+  void inherit_blocks(const TileSurfaces& surfaces, std::span<const std::uint32_t> slots,
+                      SampleState& state) const;
+  /// Copies the samples that pixel i of the last look_up takes over to pixel `pixel` of
   /// `state`. `old` is filled for `moved`. catchers: of the frame before.
   PixelHistory take(std::size_t i, std::size_t pixel, CatcherAlbedo& catchers, SampleState& state,
                     OldSurfaces& old) const;
 
-  /// What the neighbours of pixel first + i carry, until the next call.
+  /// What the neighbours of pixel i carry, until the next call.
   std::span<const CarriedSet> neighbors(std::size_t i, CatcherAlbedo& catchers);
 
   /// Rays traced so far.
   std::uint64_t num_rays() const { return old_pixels_.num_rays(); }
 
  private:
-  /// A pixel and where its history lies.
-  struct Slot {
-    std::span<const SurfaceHit> hits;  ///< what it sees now
-    RngKey key;
-    std::optional<OldPixels::Place> old;  ///< none: no history
-    bool same_pixel = false;
-  };
   struct Position {
     std::int32_t x = 0, y = 0;
   };
@@ -64,6 +61,15 @@ class Reprojection {
     std::array<std::uint8_t, limits::kMaxSites> from{};
     std::array<std::uint8_t, limits::kMaxSites> count{};
   };
+  /// A pixel and where its history lies.
+  struct Slot {
+    std::span<const SurfaceHit> hits;  ///< what it sees now
+    RngKey key;
+    std::optional<OldPixels::Place> old;  ///< none: no history
+    bool same_pixel = false;
+    PixelHistory history = PixelHistory::none;
+    Inheritance inheritance{};  ///< where history is `moved`
+  };
 
   std::optional<Position> find_source(std::span<const SurfaceHit> hits, const Position& pixel,
                                       const Rng& rng) const;
@@ -72,8 +78,8 @@ class Reprojection {
                                      std::span<const SurfaceHit> old) const;
   static std::uint8_t find_heir(std::span<const SurfaceHit> hits, const Inheritance& inheritance,
                                 std::uint8_t old_site, std::uint32_t k);
-  void copy_samples(const Slot& slot, const Inheritance& inheritance, std::size_t pixel,
-                    SampleState& state) const;
+  void judge(Slot& slot) const;
+  void copy_samples(const Slot& slot, std::size_t pixel, SampleState& state) const;
 
   const RenderContext& context_;
   const FrameGeometry& now_;

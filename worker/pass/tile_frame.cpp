@@ -8,6 +8,7 @@
 #include "common/job/aov.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/pixel_books.h"
+#include "worker/pass/pixel_order.h"
 
 namespace baton {
 namespace {
@@ -51,9 +52,11 @@ void TileFrameRenderer::render(const TileRound& at, SampleState& state, RoundMea
   RoundWork work(context_, at);
   PixelStarts starts(geometry_, work);
   PixelBatch batch;
-  for (std::size_t first = 0; first < num_pixels; first += PixelBatch::kMost) {
-    batch.begin(first, std::min(PixelBatch::kMost, num_pixels - first));
-    starts.begin(batch);
+  const PixelOrder order(at.surfaces.rect, at.surfaces.pixels, !state.block_planes.empty(),
+                         PixelBatch::kMost);
+  for (std::size_t i = 0; i < order.num_batches(); ++i) {
+    batch.begin(order.batch(i));
+    starts.begin(batch, state);
     sample(work, starts, state, batch);
     trace(work, batch);
     shade(work, state, batch);
@@ -91,17 +94,18 @@ void TileFrameRenderer::sample(RoundWork& work, PixelStarts& starts, SampleState
                                PixelBatch& batch) {
   const StageTimer timer(work.seconds.sample);
   const TileSurfaces& surfaces = work.at.surfaces;
-  const auto look_ahead = [&](std::size_t slot) {
+  const auto look_ahead = [&](std::size_t i) {
+    const std::size_t slot = batch.slots[i];
     if (!surfaces.sees_surface(slot)) return;
-    const bool has_history = starts.find(slot, state);
+    const bool has_history = starts.find(i, slot, state);
     sampler_of(surfaces, slot)
         .look_ahead(work.light, has_history, {state, surfaces.pixels.index(slot)});
   };
   SiteBlock sites;
-  look_ahead(batch.first);
-  for (std::size_t i = 0; i < batch.count; ++i) {
-    const std::size_t slot = batch.first + i, index = surfaces.pixels.index(slot);
-    if (i + 1 < batch.count) look_ahead(slot + 1);
+  look_ahead(0);
+  for (std::size_t i = 0; i < batch.count(); ++i) {
+    const std::size_t slot = batch.slots[i], index = surfaces.pixels.index(slot);
+    if (i + 1 < batch.count()) look_ahead(i + 1);
     if (surfaces.sees_surface(slot)) {
       poison(sites);
       batch.emission[i] = gather_sites(geometry_, surfaces.pixel(slot),
@@ -114,11 +118,11 @@ void TileFrameRenderer::sample(RoundWork& work, PixelStarts& starts, SampleState
                     .presampled = work.light.frame.presampled->of(x, y),
                     .key = work.key(index),
                     .rounds_before = work.at.rounds_before(context_.job.quality.rounds),
-                    .start = starts.of(slot),
+                    .start = starts.of(i),
                     .hits = surfaces.pixel(slot),
                     .geometry = &geometry_,
                     .wants_unshadowed = wants_unshadowed_},
-                   slot, {state, index}, batch);
+                   i, {state, index}, batch);
     } else {
       see_nothing(work, slot, state);
     }
@@ -133,10 +137,10 @@ void TileFrameRenderer::see_nothing(const RoundWork& work, std::size_t slot, Sam
   if (work.at.round == Round(0)) ++stats_.pixels_background;
 }
 
-void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, std::size_t slot,
+void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, std::size_t i,
                                      const PixelState& pixel, PixelBatch& batch) {
   const TileSurfaces& surfaces = work.at.surfaces;
-  const std::size_t i = slot - batch.first;
+  const std::size_t slot = batch.slots[i];
   PixelResult& result = batch.pixels[i];
   const auto sample_edge = [&] {
     return edge_.sample(context_.method, input, work.catchers, pixel);
@@ -149,7 +153,7 @@ void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, s
   }
 
   const SiteOrigins origins = origins_of(input.hits);
-  if (!is_catcher) sample_again(work, input, slot, pixel, origins, batch);
+  if (!is_catcher) sample_again(work, input, i, pixel, origins, batch);
   RayWriter rays(origins, batch.rays);
   const PixelDiagnostics did = sampler_of(surfaces, slot).sample(input, pixel, rays);
   batch.known[i] = rays.known;
@@ -173,13 +177,13 @@ void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, s
 }
 
 /// Another draw of the pixel, where its error is to be told.
-void TileFrameRenderer::sample_again(RoundWork& work, const PixelInput& input, std::size_t slot,
+void TileFrameRenderer::sample_again(RoundWork& work, const PixelInput& input, std::size_t i,
                                      const PixelState& pixel, const SiteOrigins& origins,
                                      PixelBatch& batch) {
   if (!work.probe_light || !(draws_twice_ || work.is_probe(pixel.index))) return;
   const auto [x, y] = work.at.surfaces.rect.place(pixel.index);
-  batch.again[slot - batch.first] =
-      probe_.sample_again(method_of(work.at.surfaces, slot), input, *work.probe_light,
+  batch.again[i] =
+      probe_.sample_again(method_of(work.at.surfaces, batch.slots[i]), input, *work.probe_light,
                           work.probe_light->frame.presampled->of(x, y), pixel, origins);
 }
 
@@ -196,8 +200,8 @@ void TileFrameRenderer::shade(RoundWork& work, SampleState& state, PixelBatch& b
   const StageTimer timer(work.seconds.shade);
   const TileSurfaces& surfaces = work.at.surfaces;
   std::size_t first = 0;
-  for (std::size_t i = 0; i < batch.count; ++i) {
-    const std::size_t slot = batch.first + i, index = surfaces.pixels.index(slot);
+  for (std::size_t i = 0; i < batch.count(); ++i) {
+    const std::size_t slot = batch.slots[i], index = surfaces.pixels.index(slot);
     const std::size_t end = batch.end_ray[i], count = end - first;
     if (!surfaces.sees_surface(slot)) continue;
     const KnownLight& known = batch.known[i];
@@ -237,13 +241,13 @@ void TileFrameRenderer::show(RoundWork& work, PixelBatch& batch, RoundMean& film
   if (show_environment) {
     const EnvironmentView seen = view_of(work.at.light.seen);
     EnvironmentBehind behind(seen, background);
-    for (std::size_t i = 0; i < batch.count; ++i)
-      behind.add(i, surfaces.pixel(batch.first + i), surfaces.pixel_rays(batch.first + i));
+    for (std::size_t i = 0; i < batch.count(); ++i)
+      behind.add(i, surfaces.pixel(batch.slots[i]), surfaces.pixel_rays(batch.slots[i]));
     behind.flush();
   }
-  for (std::size_t i = 0; i < batch.count; ++i) {
+  for (std::size_t i = 0; i < batch.count(); ++i) {
     PixelResult& pixel = batch.pixels[i];
-    const std::size_t slot = batch.first + i;
+    const std::size_t slot = batch.slots[i];
     if (surfaces.sees_surface(slot) && surfaces.first_surface(slot).is_catcher) {
       const PixelResult caught = std::exchange(pixel, {});  // which is not in the image
       pixel.shadow = caught.catcher > 0 ? caught.shadow : caught.radiance + caught.shadow;

@@ -41,11 +41,11 @@ class TileFrameRenderer {
   void shade(RoundWork& work, SampleState& state, PixelBatch& batch);
   void show(RoundWork& work, PixelBatch& batch, RoundMean& film);
 
-  /// The parts of `sample`.
+  /// The parts of `sample`. i: number of the pixel in its batch.
   void see_nothing(const RoundWork& work, std::size_t slot, SampleState& state);
-  void sample_pixel(RoundWork& work, const PixelInput& input, std::size_t slot,
+  void sample_pixel(RoundWork& work, const PixelInput& input, std::size_t i,
                     const PixelState& pixel, PixelBatch& batch);
-  void sample_again(RoundWork& work, const PixelInput& input, std::size_t slot,
+  void sample_again(RoundWork& work, const PixelInput& input, std::size_t i,
                     const PixelState& pixel, const SiteOrigins& origins, PixelBatch& batch);
 
   /// The method of a slot's first surface: its material's own, or the job's.

@@ -13,6 +13,7 @@
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/fine_sites.h"
 #include "worker/pass/geometry_planes.h"
+#include "worker/pass/pixel_order.h"
 #include "worker/pass/sweep_mean.h"
 #include "worker/pass/tile_frame.h"
 
@@ -57,6 +58,20 @@ Status check_previous(const RenderContext& context, const TileRun& run,
 
 /// What sites see takes 120 bytes each, which their pixels' methods read soon after.
 constexpr std::size_t kSitesInCache = 4096;
+constexpr std::size_t kPixelsOfBlock = std::size_t{PixelBlocks::kSide} * PixelBlocks::kSide;
+
+/// The pixels of a preroll round: one of each square of 2 x 2, in each round another. Blocks learn
+/// together, and a quarter of their pixels is enough to begin with.
+RoundPixels preroll_pixels(const PixelRect& rect, Round round) {
+  constexpr std::int32_t kTurn[] = {0, 3, 1, 2};
+  const std::int32_t turn = kTurn[-round.value() & 3];
+  RoundPixels pixels;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(rect.area()); ++i) {
+    const auto [x, y] = rect.place(i);
+    if ((x & 1) + 2 * (y & 1) == turn) pixels.add(i, 1);
+  }
+  return pixels;
+}
 
 /// A tile on its way through its frames, round by round.
 class TileWalk {
@@ -96,8 +111,9 @@ class TileWalk {
     for (Round round = first; round < Round(context_.job.quality.rounds); ++round) {
       if (stop_.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
       if (round == Round(limits::kJudgingRounds)) adaptive.judge(film);
-      RoundPixels pixels = adaptive.pixels(round);
-      if (pixels.size() == 0) break;
+      RoundPixels pixels =
+          round < Round(0) ? preroll_pixels(rect_, round) : adaptive.pixels(round);
+      if (round >= Round(0) && pixels.size() == 0) break;
       BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));
       const bool is_seen = round >= Round(0);
       RoundMean& mean = !is_seen ? *unseen : film;
@@ -170,24 +186,29 @@ class TileWalk {
     num_tile_sites_ = std::accumulate(counts_.begin(), counts_.end(), std::size_t{0});
   }
   bool is_one_part() const { return counts_.empty() || num_tile_sites_ <= limits::kMaxSitesAtOnce; }
-  /// The pixels of a round, as many at a time as caches have room for; all together where
-  /// these are kept.
+  std::size_t num_sites(std::size_t index) const {
+    return counts_.empty() ? static_cast<std::size_t>(context_.job.image.sites) : counts_[index];
+  }
+  /// The pixels of a round, as many whole batches at a time as caches have room for; all together
+  /// where these are kept.
   std::vector<RoundPixels> parts_of(RoundPixels pixels, bool are_kept) const {
     std::vector<RoundPixels> parts;
     if (are_kept && pixels.are_all(state_.num_pixels())) {
       parts.push_back(std::move(pixels));
       return parts;
     }
+    const PixelOrder order(rect_, pixels, !state_.block_planes.empty(), kPixelsOfBlock);
     std::size_t room = 0;
-    for (std::size_t slot = 0; slot < pixels.size(); ++slot) {
-      const std::size_t index = pixels.index(slot);
-      const std::size_t sites =
-          counts_.empty() ? static_cast<std::size_t>(context_.job.image.sites) : counts_[index];
+    for (std::size_t i = 0; i < order.num_batches(); ++i) {
+      const std::span<const std::uint32_t> batch = order.batch(i);
+      std::size_t sites = 0;
+      for (const std::uint32_t slot : batch) sites += num_sites(pixels.index(slot));
       if (sites > room) {
         parts.emplace_back();
-        room = kSitesInCache;
+        room = std::max(sites, kSitesInCache);
       }
-      parts.back().add(index, pixels.weight(slot));
+      for (const std::uint32_t slot : batch)
+        parts.back().add(pixels.index(slot), pixels.weight(slot));
       room -= sites;
     }
     return parts;

@@ -26,9 +26,8 @@ bool RoundWork::is_probe(std::size_t index) const {
   return baton::is_probe(x, y, at.frame.number, job.seed);
 }
 
-void PixelBatch::begin(std::size_t new_first, std::size_t new_count) {
-  first = new_first;
-  count = new_count;
+void PixelBatch::begin(std::span<const std::uint32_t> new_slots) {
+  slots = new_slots;
   rays.clear();
   poison(end_ray);
   known.fill({});

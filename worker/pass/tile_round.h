@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/job/task.h"
@@ -58,15 +59,13 @@ struct RoundWork {
   SamplingStats sampling;
 };
 
-/// The pixels in work: slots [first, first + count) of the round, so few that they stay in the
-/// cache, with what one stage hands to the next.
+/// The pixels in work, so few that they stay in the cache, with what one stage hands to the next.
 struct PixelBatch {
   static constexpr std::size_t kMost = 64;
   template <class T>
   using Column = std::array<T, kMost>;
 
-  std::size_t first = 0;
-  std::size_t count = 0;
+  std::span<const std::uint32_t> slots;  ///< of the round, at most kMost
   RayBatch rays;
   Column<std::size_t> end_ray;       ///< where each pixel's rays end
   Column<KnownLight> known;          ///< what its method knows
@@ -74,8 +73,9 @@ struct PixelBatch {
   Column<Rgb> emission;              ///< emission of what pixels see
   Column<std::optional<Rgb>> again;  ///< radiance once more, where it is wanted
 
+  std::size_t count() const { return slots.size(); }
   /// Makes room for other pixels.
-  void begin(std::size_t new_first, std::size_t new_count);
+  void begin(std::span<const std::uint32_t> new_slots);
 };
 
 }  // namespace baton

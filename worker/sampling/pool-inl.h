@@ -16,19 +16,24 @@
 #include "worker/sampling/chosen_rays-inl.h"
 #include "worker/sampling/light_noise.h"
 #include "worker/sampling/pool.h"
+#include "worker/sampling/visibility_table.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// A lane's bin of VisibilityBins.
-HWY_INLINE VI BinsOf(VU code) {
-  constexpr int kBits = VisibilityBins::kBits;
-  constexpr std::uint32_t kMost = VisibilityBins::kSide - 1;
+/// A lane's bin of BlockMemory. inverse_density: of its direction in the map's table, in sr.
+HWY_INLINE VI BinsOf(VU code, VF inverse_density) {
+  constexpr int kBits = BlockMemory::kBits;
+  constexpr std::uint32_t kMost = BlockMemory::kSide - 1;
   const DU du;
+  const DI di;
   const VU across = hn::And(hn::ShiftRight<16 - kBits>(code), hn::Set(du, kMost));
   const VU down = hn::And(hn::ShiftRight<32 - 2 * kBits>(code), hn::Set(du, kMost << kBits));
-  return hn::BitCast(DI(), hn::Or(across, down));
+  const auto is_lamp = hn::Lt(inverse_density, hn::Set(DF(), 1 / kLampDensity));
+  const VI of_kind = hn::IfThenElseZero(hn::RebindMask(di, is_lamp),
+                                        hn::Set(di, static_cast<std::int32_t>(BlockMemory::kBins)));
+  return hn::Or(hn::BitCast(di, hn::Or(across, down)), of_kind);
 }
 
 HWY_INLINE VF ContributionFactor(const PoolTuning& tuning, VF expected) {
@@ -46,44 +51,29 @@ struct ProspectLanes {
   VF expected, contribution, deviation;
 };
 
-/// A pixel's memory: the share of free rays in a direction's bin, or that of all rays where the bin
-/// has seen none, or 1/2.
+/// V^ of bins, as the rounds before have left it.
 class RememberedLanes {
  public:
-  RememberedLanes(const PoolTuning& tuning, const PixelMemory& memory)
+  RememberedLanes(const PoolTuning& tuning, const VisibilityTable& table)
       : tuning_(tuning),
-        memory_(memory.has_bins() ? &memory : nullptr),
-        all_((memory.all_rays & 15) != 0 ? memory.all_rays : 2048 << 4),
-        everywhere_(Prospect(Share(hn::Set(DI(), all_)))) {}
+        expected_(table.is_uniform ? nullptr : table.expected.data()),
+        everywhere_(Prospect(hn::Set(DF(), table.everywhere))) {}
 
-  /// A pixel whose rays have always agreed expects the same everywhere.
-  HWY_INLINE ProspectLanes Look(VU code) const {
-    if (memory_ != nullptr) return Prospect(ShareInBins(code));
-    return {everywhere_.expected, everywhere_.contribution, everywhere_.deviation};
+  HWY_INLINE ProspectLanes Look(VI bin) const {
+    if (expected_ == nullptr)
+      return {everywhere_.expected, everywhere_.contribution, everywhere_.deviation};
+    return Prospect(hn::GatherIndex(DF(), expected_, bin));
+  }
+  HWY_INLINE VF Expected(VI bin) const {
+    return expected_ == nullptr ? everywhere_.expected : hn::GatherIndex(DF(), expected_, bin);
   }
 
  private:
-  HWY_INLINE VF ShareInBins(VU code) const {
-    const DI di;
-    // Two cells come with each load; ours is the lower one.
-    static_assert(sizeof(VisibilityCell) == 2 && offsetof(PixelMemory, bins) == 0);
-    const VI pair = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(memory_),
-                                     hn::ShiftLeft<1>(BinsOf(code)));
-    const auto unseen = hn::Eq(hn::And(pair, hn::Set(di, 15)), hn::Zero(di));
-    return Share(hn::IfThenElse(unseen, hn::Set(di, all_), pair));
-  }
   HWY_INLINE ProspectLanes Prospect(VF expected) const {
     return {expected, ContributionFactor(tuning_, expected), DeviationFactor(tuning_, expected)};
   }
-  /// The share of free rays in cells, which are in the lower halves.
-  static HWY_INLINE VF Share(VI cells) {
-    const DF d;
-    const VI share = hn::And(cells, hn::Set(DI(), 0xFFF0));
-    return hn::MulAdd(hn::ConvertTo(d, share), hn::Set(d, 1.0f / 65536), hn::Set(d, 0.5f / 4096));
-  }
   const PoolTuning& tuning_;
-  const PixelMemory* memory_;  ///< null: rays have always agreed
-  std::int32_t all_;
+  const float* expected_;  ///< by bin; null: the same everywhere
   ProspectLanes everywhere_;
 };
 
@@ -93,9 +83,9 @@ struct WeighedLines {
   static constexpr bool kHasColors = true;
   const RememberedLanes* memory;
   RunningSums::End contribution, deviation;
-  float* next_expected;
-  /// Where the expectations of this kind of candidates begin.
-  const float* first_expected = next_expected;
+  std::int32_t* next_bin;
+  /// Where the bins of this kind of candidates begin.
+  const std::int32_t* first_bin = next_bin;
   VF light = hn::Zero(DF());                                         ///< sum of w
   Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< sum of w V^ (f cos L) / p~
   VF previous = hn::Zero(DF());                                      ///< w V^ before
@@ -104,18 +94,20 @@ struct WeighedLines {
   /// `bends` of the candidates from the light, once they are done.
   VF light_bends = hn::Zero(DF());
 
-  /// A vector of candidates. add_color(share, sum) adds share w (f cos L)_rgb / p~ to `sum`.
+  /// A vector of candidates. inverse_density: of the map's table. add_color(share, sum) adds share
+  /// w (f cos L)_rgb / p~ to `sum`.
   template <class AddColor>
-  HWY_INLINE void Add(VU code, VF weight, const AddColor& add_color) {
+  HWY_INLINE void Add(VU code, VF inverse_density, VF weight, const AddColor& add_color) {
     const DF d;
-    const ProspectLanes prospect = memory->Look(code);
-    hn::Store(prospect.expected, d, next_expected);
-    next_expected += hn::Lanes(d);
+    const VI bin = BinsOf(code, inverse_density);
+    const ProspectLanes prospect = memory->Look(bin);
+    hn::Store(bin, DI(), next_bin);
+    next_bin += hn::Lanes(d);
     contribution.Add(hn::Mul(weight, prospect.contribution));
     deviation.Add(hn::Mul(weight, prospect.deviation));
     light = hn::Add(light, weight);
     const VF likely = hn::Mul(weight, prospect.expected);
-    const auto number = next_expected - first_expected;
+    const auto number = next_bin - first_bin;
     if (number <= 2 * std::ptrdiff_t{hn::MaxLanes(d)}) {  // the first two are too few
       if (number <= std::ptrdiff_t{hn::MaxLanes(d)}) previous = likely;
       last_step = hn::Sub(likely, previous);
@@ -131,7 +123,7 @@ struct WeighedLines {
   HWY_INLINE void BeginBsdf() {
     light_bends = bends;
     bends = hn::Zero(DF());
-    first_expected = next_expected;
+    first_bin = next_bin;
   }
 };
 
@@ -158,7 +150,8 @@ struct RayPlan {
 /// to w times a factor, w cancels. With the control variate, less what was expected of them.
 template <class Chosen>
 HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const RayPlan& plan,
-                           const DistinctPicks& picks, const float* expected_of, PixelRays& out) {
+                           const DistinctPicks& picks, const RememberedLanes& remembered,
+                           const std::int32_t* bin_of, PixelRays& out) {
   const DF d;
   const DI di;
   const VF per_pick = hn::Set(d, plan.total / static_cast<float>(plan.count));
@@ -169,14 +162,16 @@ HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const
     const VI pick = hn::Load(di, picks.pick.from(j));
     const auto c = chosen.Evaluate(pick);
     const Vec3Lanes w = DecodeOctahedral(c.code);
-    const VF seen = hn::GatherIndex(d, expected_of, pick);
+    const VI bin = hn::GatherIndex(di, bin_of, pick);
+    const VF seen = remembered.Expected(bin);
     const VF light =
         hn::Div(hn::Mul(per_pick, hn::Load(d, picks.times.from(j))),
                 plan.control ? DeviationFactor(tuning, seen) : ContributionFactor(tuning, seen));
     const Vec3Lanes color = Scale(c.reflected, hn::Div(light, MeanLanes(c.reflected)));
     const VF share = hn::Mul(light, per_light);
     StoreRays(w, color, share, c.site, j, out);
-    hn::StoreU(hn::DemoteTo(DB(), BinsOf(c.code)), DB(), out.bin.from(j));
+    const hn::Rebind<std::uint16_t, DI> du16;
+    hn::StoreU(hn::DemoteTo(du16, bin), du16, out.bin.from(j));
     const Vec3Lanes sure = Scale(color, seen);
     expected = HWY_NAMESPACE::Add(expected, sure);
     expected_share = hn::MulAdd(share, seen, expected_share);
@@ -191,13 +186,13 @@ HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const
 /// systematically, u in [0, 1). A candidate that is chosen twice is traced once. candidates: has
 /// Weigh(lines), which adds all of them in turn, those of the light first; Chosen(), whose
 /// Evaluate(picks) gives `code`, `site` and `reflected` by their number on the line; the numbers
-/// from_light and from_bsdf; and mean_radiance, of the environment. memory: as the frames before
+/// from_light and from_bsdf; and mean_radiance, of the environment. memory: as the rounds before
 /// left it. num_rays: N, > 0; with a memory a pixel gets N / 2 to 4 N rays, at most kMaxParticles.
 /// out: empty. Returns the sum of the weights, an unbiased estimate of Lns; when it is not positive
 /// and finite, out stays empty.
 template <class Candidates>
 HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates, float u,
-                          std::int32_t num_rays, const PixelMemory& memory, PoolLines& scratch,
+                          std::int32_t num_rays, const VisibilityTable& memory, PoolLines& scratch,
                           PixelRays& out) {
   const DF d;
   const auto sum = [&](VF v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
@@ -206,7 +201,7 @@ HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates
   RunningSums contribution(scratch.contribution_sums.from(0));
   RunningSums deviation(scratch.deviation_sums.from(0));
   const RememberedLanes remembered(tuning, memory);
-  WeighedLines lines{&remembered, contribution.end, deviation.end, scratch.expected.from(0)};
+  WeighedLines lines{&remembered, contribution.end, deviation.end, scratch.bins.from(0)};
   candidates.Weigh(lines);
   contribution.end = lines.contribution;
   deviation.end = lines.deviation;
@@ -221,7 +216,7 @@ HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates
   const float scale = noise_scale(tuning, expected, candidates.mean_radiance);
   const RayPlan plan{control ? deviation : contribution,
                      control ? total_deviation : contribution.Finish(), control,
-                     memory.outcomes != 0
+                     memory.knows_rays
                          ? rays_for_deviation(tuning, num_rays, total_deviation, scale)
                          : num_rays,
                      lns};
@@ -231,7 +226,7 @@ HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates
 
   // Choose them.
   const DistinctPicks picks(plan.line, plan.total, u, static_cast<std::size_t>(plan.count));
-  LookUpRays(tuning, candidates.Chosen(), plan, picks, scratch.expected.from(0), out);
+  LookUpRays(tuning, candidates.Chosen(), plan, picks, remembered, scratch.bins.from(0), out);
   return lns;
 }
 

@@ -11,8 +11,9 @@
 namespace baton {
 
 /// The decisions of the pool sampler; its work on a frame is in pool-inl.h. A pixel's M fresh
-/// candidates y_i have weights w_i, which sum to Lns; its memory of earlier rays expects the
-/// visibility V^ of each, the share of free rays around it. V^ steers which candidates get a ray
+/// candidates y_i have weights w_i, which sum to Lns; the memory of earlier rays of its block of
+/// pixels expects the visibility V^ of each, the share of free rays around it
+/// (visibility_table.h). V^ steers which candidates get a ray
 /// and how many, and it cannot bias: candidates and memory decide before any ray is chosen, and
 /// each ray is divided by the factor that chose it. The factor is the standard deviation of what a
 /// ray adds, which is the choice of least variance:
@@ -28,7 +29,8 @@ using CandidateLine = PaddedArray<float, limits::kMaxCandidates + kVectorPadding
 /// Work space of a pixel in a frame.
 struct PoolLines {
   CandidateLine contribution_sums, deviation_sums;
-  CandidateLine expected;  ///< V^ of each candidate
+  /// Bin of BlockMemory that each candidate's direction is in.
+  PaddedArray<std::int32_t, limits::kMaxCandidates + kVectorPadding> bins;
 };
 
 /// Whether V^ is the control variate. That subtracts what was expected of a blocked ray, and can
@@ -40,13 +42,12 @@ inline bool use_control(const PoolTuning& tuning, float expected, float deviatio
 }
 
 /// Rays of a pixel with a memory: N where the deviation is the usual one beside `scale`, else in
-/// proportion to its power of 3/4, to 4 N and kMaxParticles. (In proportion to the deviation itself
-/// would be best if memories were right.) scale: noise_scale(), > 0.
+/// proportion to it, to 4 N and kMaxParticles: least variance for a given sum of rays. scale:
+/// noise_scale(), > 0.
 inline std::int32_t rays_for_deviation(const PoolTuning& tuning, std::int32_t num_rays,
                                        float deviation, float scale) {
-  const float root = std::sqrt(deviation / (tuning.usual_deviation * scale));
-  const float share =
-      std::clamp(root * std::sqrt(root), tuning.least_rays, float{limits::kMostPoolRays});
+  const float share = std::clamp(deviation / (tuning.usual_deviation * scale), tuning.least_rays,
+                                 float{limits::kMostPoolRays});
   const auto wanted = static_cast<std::int32_t>(std::ceil(share * static_cast<float>(num_rays)));
   return std::min<std::int32_t>({wanted, limits::kMostPoolRays * num_rays, limits::kMaxParticles});
 }

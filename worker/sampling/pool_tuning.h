@@ -10,17 +10,20 @@ namespace baton {
 struct PoolTuning {
   /// What a pixel's noise is compared with: the light that it expects and so many times the mean
   /// radiance of the environment, as nobody sees the noise of dark pixels among bright ones.
-  float surroundings = 3;
+  float surroundings = 1;
+
+  /// Rays that the guess of coarser bins counts as, in what a bin expects (VisibilityTable).
+  float prior_rays = 6;
 
   /// Least factor on a candidate's weight where V^ is the control variate: candidates whose
   /// visibility has no variance still get some rays.
-  float least_deviation = 0.1f;
+  float least_deviation = 0.05f;
   /// Least factor on a candidate's weight where V^ is no control variate. A lamp that is always
   /// blocked leaves rays to the rest.
   float least_contribution = 0.05f;
   /// V^ is the control variate where the expected light is so many times its deviation. Later
   /// loses; earlier, a blocked ray may leave a value below zero more often.
-  float control_from = 2;
+  float control_from = 1.5f;
   /// Standard deviation of visibility over noise_scale() that gives N rays.
   float usual_deviation = 0.025f;
   /// Least share of N rays.
@@ -35,7 +38,7 @@ struct PoolTuning {
   };
   Candidates light{0.0015f, 0.25f};
   /// Those from lobes take more time, and too few of them miss lamps without showing any noise.
-  Candidates lobes{0.008f, 1};
+  Candidates lobes{0.004f, 1};
   /// Most candidates of a kind, times the usual number.
   float most_candidates = 64;
   /// Fewest candidates of the light: the noise estimate needs second differences, so three vectors

@@ -32,7 +32,7 @@ int num_blocks(int width) { return (width + kBlock - 1) / kBlock; }
 }  // namespace
 
 EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float scale,
-                               bool compensate, const HiddenCone& hidden)
+                               bool compensate, const HiddenCone& hidden, float capped_share)
     : width_(image.width), height_(image.height), filter_(filter) {
   BATON_CHECK(width_ > 0 && height_ > 0);
   BATON_CHECK(image.rgb.size() == std::size_t{3} * static_cast<std::size_t>(width_) * height_);
@@ -56,11 +56,11 @@ EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float sc
   std::copy_n(texels_.begin() + stride(), stride(), texels_.begin());
   std::copy_n(texels_.end() - 2 * stride(), stride(), texels_.end() - stride());
   if (hidden.angle > 0) hide(hidden);
-  build_table(compensate);
+  build_table(compensate, capped_share);
 }
 
 EnvironmentMap::EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t,
-                               float scale, bool compensate)
+                               float scale, bool compensate, float capped_share)
     : width_(a.width_), height_(a.height_), filter_(a.filter_) {
   BATON_CHECK(a.width_ == b.width_ && a.height_ == b.height_ && a.filter_ == b.filter_);
   texels_.resize(a.texels_.size());
@@ -70,7 +70,7 @@ EnvironmentMap::EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b,
     texels_[i] = {scale * ((1 - t) * p.r + t * q.r), scale * ((1 - t) * p.g + t * q.g),
                   scale * ((1 - t) * p.b + t * q.b), std::copysign(0.0f, p.density)};
   }
-  build_table(compensate);
+  build_table(compensate, capped_share);
 }
 
 int EnvironmentMap::cell_rows() const { return height_ + (filter_ == MapFilter::bilinear ? 1 : 0); }
@@ -152,7 +152,24 @@ double EnvironmentMap::integral_of_weights() const {
   return sum;
 }
 
-void EnvironmentMap::build_table(bool compensate) {
+void EnvironmentMap::cap_weights(float share, double power) {
+  std::vector<float> plain(texels_.size());
+  std::transform(texels_.begin(), texels_.end(), plain.begin(),
+                 [](const Texel& texel) { return std::fabs(texel.density); });
+  const auto most = static_cast<float>(power / (4 * std::numbers::pi));
+  for (Texel& texel : texels_)
+    texel.density = std::copysign(std::min(std::fabs(texel.density), most), texel.density);
+  const double capped_power = integral_of_weights();
+  if (!(capped_power > 0)) share = 0;
+  const double factor = share > 0 ? share / capped_power * power : 0;
+  for (std::size_t i = 0; i < texels_.size(); ++i) {
+    Texel& texel = texels_[i];
+    const double weight = (1 - double{share}) * plain[i] + factor * std::fabs(texel.density);
+    texel.density = std::copysign(static_cast<float>(weight), texel.density);
+  }
+}
+
+void EnvironmentMap::build_table(bool compensate, float capped_share) {
   const int rows = cell_rows(), blocks = num_blocks(width_);
   for (int r = 0; r < rows; ++r) rows_.emplace_back(row_angle(r), row_angle(r + 1), width_);
 
@@ -162,6 +179,10 @@ void EnvironmentMap::build_table(bool compensate) {
     reduce_weights(total_power_ / (4 * std::numbers::pi), 1);
     power = integral_of_weights();
     if (power < kMinCompensatedShare * total_power_) power = weigh_texels();
+  }
+  if (capped_share > 0 && power > 0) {
+    cap_weights(capped_share, power);
+    power = integral_of_weights();
   }
   reduce_weights(0, power > 0 ? 1 / power : 0);
 
@@ -271,11 +292,16 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
 }
 
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
-                        bool compensate, const HiddenCone& hidden) {
+                        bool compensate, const HiddenCone& hidden, float capped_share) {
   const int width = map_sides(picture.width, picture.height, environment.max_width)[0];
   if (width == picture.width)
-    return {picture, environment.filter, environment.scale, compensate, hidden};
-  return {reduce_map(picture, width, environment.scale), environment.filter, 1, compensate, hidden};
+    return {picture, environment.filter, environment.scale, compensate, hidden, capped_share};
+  return {reduce_map(picture, width, environment.scale),
+          environment.filter,
+          1,
+          compensate,
+          hidden,
+          capped_share};
 }
 
 }  // namespace baton

@@ -32,7 +32,9 @@ struct HiddenCone {
 /// four texel centres (W x (H+1), the first and last row half as high). Every texel has a weight,
 /// the mean over RGB of its radiance (less what MIS compensation takes off), and the density is the
 /// same reconstruction of these weights over their integral: without compensation it is the mean
-/// radiance along the direction over the map's power, exactly. Cells that lie in a HiddenCone are
+/// radiance along the direction over the map's power, exactly. A share of it may go by the radiance
+/// capped at the map's mean instead: where nearly all of the power is in a lamp, who does not see
+/// that has directions left. Cells that lie in a HiddenCone are
 /// seen, and light nothing: no density.
 ///
 /// Texels are stored once, padded by one texel on every side, as {R, G, B, density}: texel (i, j)
@@ -49,12 +51,13 @@ class EnvironmentMap {
   };
 
   /// image: at least 1x1. scale: radiance factor. compensate: the table of MIS compensation, max(0,
-  /// L - mean L) [Karlik et al. 2019] (a constant map keeps its plain table).
+  /// L - mean L) [Karlik et al. 2019] (a constant map keeps its plain table). capped_share: of the
+  /// density, by capped radiance; [0, 1), not with `compensate`.
   EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate,
-                 const HiddenCone& hidden = {});
+                 const HiddenCone& hidden = {}, float capped_share = 0);
   /// Texels scale ((1 - t) a + t b); a and b of one size and filter, with one cone. t in [0, 1].
   EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, float scale,
-                 bool compensate);
+                 bool compensate, float capped_share = 0);
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -105,7 +108,9 @@ class EnvironmentMap {
   double weight_down(const Texel* texel, double place) const;
   /// Integral of the weights over the visible cells.
   double integral_of_weights() const;
-  void build_table(bool compensate);
+  /// Mixes that share of capped weights in. power: integral of the weights, > 0.
+  void cap_weights(float share, double power);
+  void build_table(bool compensate, float capped_share);
 
   int width_ = 0, height_ = 0;
   MapFilter filter_ = MapFilter::bilinear;
@@ -123,7 +128,7 @@ class EnvironmentMap {
 /// The map of a file's picture as the environment says: scaled, repaired, and reduced to
 /// max_width columns where it has more.
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
-                        bool compensate, const HiddenCone& hidden = {});
+                        bool compensate, const HiddenCone& hidden = {}, float capped_share = 0);
 
 /// A map turned by a rotation: what one frame is lit by.
 struct Environment {

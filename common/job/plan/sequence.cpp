@@ -80,28 +80,38 @@ ImageSpec scaled(const ImageSpec& image, double scale) {
   return small;
 }
 
+namespace {
+
+/// The last multiple of TileGrid::kAlign that is not past `x`, which may be negative.
+std::int32_t aligned(std::int32_t x) {
+  const std::int32_t rest = x % TileGrid::kAlign;
+  return x - (rest < 0 ? rest + TileGrid::kAlign : rest);
+}
+
+}  // namespace
+
 TileGrid::TileGrid(const PixelRect& image, int tile_size)
     : image_(image),
+      x0_(aligned(image.x0)),
+      y0_(aligned(image.y0)),
       tile_size_(tile_size),
-      columns_((image.width() + tile_size - 1) / tile_size),
-      rows_((image.height() + tile_size - 1) / tile_size) {
+      columns_(column_of(image.x1 - 1) + 1),
+      rows_(row_of(image.y1 - 1) + 1) {
   BATON_CHECK(image.width() > 0 && image.height() > 0 && tile_size > 0);
 }
 
 PixelRect TileGrid::rect(std::int32_t tile) const {
   BATON_CHECK(tile >= 0 && tile < count());
-  const std::int32_t x0 = image_.x0 + tile % columns_ * tile_size_;
-  const std::int32_t y0 = image_.y0 + tile / columns_ * tile_size_;
-  return {x0, y0, std::min(x0 + tile_size_, image_.x1), std::min(y0 + tile_size_, image_.y1)};
+  const std::int32_t x0 = x0_ + tile % columns_ * tile_size_;
+  const std::int32_t y0 = y0_ + tile / columns_ * tile_size_;
+  return common_part({x0, y0, x0 + tile_size_, y0 + tile_size_}, image_);
 }
 
 std::vector<std::int32_t> TileGrid::tiles_near(std::int32_t tile, std::int32_t reach_px) const {
   const PixelRect near = grown(rect(tile), reach_px, image_);
   std::vector<std::int32_t> tiles;
-  for (std::int32_t row = (near.y0 - image_.y0) / tile_size_;
-       row <= (near.y1 - 1 - image_.y0) / tile_size_; ++row) {
-    for (std::int32_t column = (near.x0 - image_.x0) / tile_size_;
-         column <= (near.x1 - 1 - image_.x0) / tile_size_; ++column)
+  for (std::int32_t row = row_of(near.y0); row <= row_of(near.y1 - 1); ++row) {
+    for (std::int32_t column = column_of(near.x0); column <= column_of(near.x1 - 1); ++column)
       tiles.push_back(row * columns_ + column);
   }
   return tiles;

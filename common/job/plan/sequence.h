@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/limits.h"
 #include "common/job/job_facts.h"
 #include "common/job/job_spec.h"
 #include "common/job/plan/timeline.h"
@@ -53,9 +54,14 @@ struct FrameSpec {
 /// One FrameSpec per step of the job, in order.
 std::vector<FrameSpec> expand_sequence(const JobSpec& job);
 
-/// The rendered pixels cut into square tiles, row by row; border tiles are clipped.
+/// The rendered pixels cut into square tiles, row by row; border tiles are clipped. Tiles begin at
+/// multiples of kAlign pixels of the picture, wherever what is rendered of it begins, so that they
+/// consist of whole blocks of the picture.
 class TileGrid {
  public:
+  static constexpr std::int32_t kAlign = limits::kAdaptiveBlock;
+
+  /// tile_size: a multiple of PixelBlocks::kSide, or one tile.
   TileGrid(const PixelRect& image, int tile_size);
   explicit TileGrid(const ImageSpec& image) : TileGrid(image.rendered(), image.tile_size) {}
 
@@ -69,7 +75,11 @@ class TileGrid {
   std::vector<std::int32_t> tiles_near(std::int32_t tile, std::int32_t reach_px) const;
 
  private:
+  std::int32_t column_of(std::int32_t x) const { return (x - x0_) / tile_size_; }
+  std::int32_t row_of(std::int32_t y) const { return (y - y0_) / tile_size_; }
+
   PixelRect image_;
+  std::int32_t x0_, y0_;  ///< where the first tile would begin
   std::int32_t tile_size_, columns_, rows_;
 };
 

@@ -64,7 +64,8 @@ double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surfac
     const double weights = weigh_alike(job) ? 4.0 * job.sampling.num_particles : 0;
     return surface_share * (whole - weights);
   }
-  const auto rounds = static_cast<double>(e.preroll_rounds + end * job.quality.rounds);
+  const auto rounds = kPrerollShare * static_cast<double>(e.preroll_rounds) +
+                      static_cast<double>(end * job.quality.rounds);
   const double rays = rounds * job.sampling.num_particles;
   return surface_share * std::min(whole, kMemoryBytes * rays / (rays + kHalfMemoryRays));
 }

@@ -194,7 +194,7 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
         "preroll    {} rounds before frame {} that are not seen: it takes {:.3g} times as "
         "long\n",
         e.preroll_rounds, job.frames.front(),
-        1 + static_cast<double>(e.preroll_rounds) / static_cast<double>(e.rounds));
+        1 + kPrerollShare * static_cast<double>(e.preroll_rounds) / static_cast<double>(e.rounds));
   }
   if (moves(job)) {
     fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);

@@ -34,7 +34,7 @@ TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16);
   EXPECT_EQ(estimate_job(job).state_bytes, 153 * 5000);
   job.sampling.method = Method::pool;
-  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 144);
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 4 + 68);
   job.sampling.method = Method::restir;
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16 + 2);
   for (const Method method : {Method::bidirectional, Method::ratio}) {

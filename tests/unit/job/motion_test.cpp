@@ -117,11 +117,15 @@ TEST(TileGrid, TilesNearATileAreThoseWithAPixelInReach) {
   EXPECT_EQ(grid.tiles_near(0, 1 << 20).size(), 8u);
 }
 
-TEST(TileGrid, CutsARegionFromItsCorner) {
+TEST(TileGrid, CutsARegionAtBlocksOfThePicture) {
   const TileGrid grid({10, 20, 50, 41}, 32);  // 2 x 1 tiles
   EXPECT_EQ(grid.count(), 2);
-  EXPECT_EQ(grid.rect(0), (PixelRect{10, 20, 42, 41}));
-  EXPECT_EQ(grid.rect(1), (PixelRect{42, 20, 50, 41}));
+  EXPECT_EQ(grid.rect(0), (PixelRect{10, 20, 40, 41}));
+  EXPECT_EQ(grid.rect(1), (PixelRect{40, 20, 50, 41}));
+  const TileGrid overscan({-5, -16, 3, 0}, 8);  // 2 x 2
+  EXPECT_EQ(overscan.count(), 4);
+  EXPECT_EQ(overscan.rect(0), (PixelRect{-5, -16, 0, -8}));
+  EXPECT_EQ(overscan.rect(3), (PixelRect{0, -8, 3, 0}));
   EXPECT_THAT(grid.tiles_near(1, 0), ElementsAre(1));
   EXPECT_THAT(grid.tiles_near(1, 1), ElementsAre(0, 1));
 }

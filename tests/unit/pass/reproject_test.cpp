@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <numeric>
 
 #include "common/job/text/frame_range.h"
 #include "common/state/sample_planes.h"
@@ -82,7 +83,9 @@ class Follower {
   void follow() {
     Reprojection reprojection(*context_, *now_, *before_, states_);
     const std::size_t num_pixels = states_[0]->num_pixels();
-    reprojection.look_up(surfaces_, 0, num_pixels, context_->frames[1]);
+    std::vector<std::uint32_t> slots(num_pixels);
+    std::iota(slots.begin(), slots.end(), 0u);
+    reprojection.look_up(surfaces_, slots, context_->frames[1]);
     found_.resize(num_pixels);
     SampleState state;
     state.resize(sample_format(), states_[0]->rect, 16);

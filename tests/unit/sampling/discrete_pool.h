@@ -9,7 +9,7 @@
 #include "common/math/octahedral.h"
 #include "common/math/philox.h"
 #include "worker/sampling/pool-inl.h"
-#include "worker/sampling/visibility_memory.h"
+#include "worker/sampling/visibility_table.h"
 
 namespace baton::HWY_NAMESPACE {
 
@@ -22,11 +22,12 @@ inline constexpr StateValues kVisible{1, 1, 1, 0.5f, 0, 0, 1, 0.2f, 0, 1, 1, 0.9
 
 /// Directions of different bins.
 inline OctDirection code_of(std::size_t state) {
-  const auto bin = static_cast<std::uint32_t>(5 * state + 2);
-  return (bin & 7) << 13 | 0x1000 | (bin >> 3) << 29 | 0x10000000;
+  const auto bin = static_cast<std::uint32_t>(20 * state + 2);
+  return (bin & 15) << 12 | 0x800 | (bin >> 4) << 28 | 0x8000000;
 }
+inline std::size_t state_of_bin(std::size_t bin) { return bin / 20; }
 inline std::size_t state_of(OctDirection code) {
-  return ((code >> 13 & 0x07) | (code >> 26 & 0x38)) / 5u;
+  return state_of_bin((code >> 12 & 0x0F) | (code >> 24 & 0xF0));
 }
 
 /// Candidates drawn alike from all states. Rays know nothing of them but their number on the line.
@@ -46,7 +47,7 @@ struct DiscreteCandidates {
     const DF d;
     for (std::size_t i = 0; i < static_cast<std::size_t>(from_light); i += hn::Lanes(d)) {
       const VF w = hn::Load(d, weight.from(i));
-      line.Add(hn::Load(DU(), code.from(i)), w, [&](VF share, Vec3Lanes& sum) {
+      line.Add(hn::Load(DU(), code.from(i)), hn::Set(d, 4 * kPi), w, [&](VF share, Vec3Lanes& sum) {
         const VF grey = hn::Mul(share, w);
         sum = Add(sum, {grey, grey, grey});
       });
@@ -71,9 +72,10 @@ struct DiscreteCandidates {
     std::int32_t lane[hn::MaxLanes(DI())];
     hn::StoreU(pick, DI(), lane);
     for (const std::int32_t p : lane) {
-      const auto i = static_cast<std::size_t>(p);
-      found.push_back(is_free(state_of(code[i])));
-      spoil[i] += ((found.back() ? 1.0f : 0.0f) - spoil[i]) / 6;
+      const OctDirection of = code[static_cast<std::size_t>(p)];
+      found.push_back(is_free(state_of(of)));
+      float& expected = spoil[(of >> 12 & 0x0F) | (of >> 24 & 0xF0)];
+      expected += ((found.back() ? 1.0f : 0.0f) - expected) / 6;
     }
   }
 };
@@ -112,7 +114,7 @@ class PoolChain {
 
   FrameEstimate step(const StateValues& now) {
     // Draw candidates. The fault: their number is decided by what the first of them show.
-    float known = light_variance(memory_).from_light;
+    float known = light_variance(noise_).from_light;
     if (fault_ == Fault::candidates_by_noise_of_this_frame) {
       const std::uint32_t begin = count_;
       draw(now, kCandidates);
@@ -127,7 +129,8 @@ class PoolChain {
     most_candidates = std::max(most_candidates, count);
 
     // Choose rays and trace them.
-    PixelMemory learnt = memory_;
+    BlockMemory learnt = memory_;
+    table_.read(memory_, kTuning.prior_rays);
     FrameEstimate e{.lns = choose(uniform())};
     if (space_.rays.count == 0) return e;
     const LightVariance seen = space_.rays.light_variance;
@@ -139,7 +142,7 @@ class PoolChain {
       e.image = (e.image + trace(learnt, first_is_free)) / 2;
     }
     memory_ = learnt;
-    remember_light_variance(kTuning, seen, memory_);
+    remember_light_variance(kTuning, seen, noise_);
     return e;
   }
 
@@ -166,15 +169,15 @@ class PoolChain {
   double choose(float u) {
     DiscreteCandidates& candidates = space_.candidates;
     if (fault_ == Fault::rays_of_this_frame) {
-      candidates.spoil = space_.lines.expected.from(0);
+      candidates.spoil = table_.expected.data();
       candidates.is_free = [this](std::size_t state) { return is_free(state); };
       candidates.found.clear();
     }
     space_.rays.clear();
-    return double{PoolStep(kTuning, candidates, u, kRays, memory_, space_.lines, space_.rays)};
+    return double{PoolStep(kTuning, candidates, u, kRays, table_, space_.lines, space_.rays)};
   }
   /// Traces the chosen rays and learns from them; returns the pixel.
-  double trace(PixelMemory& learnt, bool& first_is_free) {
+  double trace(BlockMemory& learnt, bool& first_is_free) {
     const PixelRays& rays = space_.rays;
     (rays.constant.visibility != 0 ? with_control : without_control) += 1;
     fewest_rays = std::min(fewest_rays, rays.count);
@@ -183,7 +186,7 @@ class PoolChain {
     std::uint64_t free = 0;
     for (std::size_t j = 0; j < rays.count; ++j) {
       const std::vector<bool>& found = space_.candidates.found;
-      const bool outcome = found.empty() ? is_free(rays.bin[j] / 5u) : found[j];
+      const bool outcome = found.empty() ? is_free(state_of_bin(rays.bin[j])) : found[j];
       if (outcome) free |= std::uint64_t{1} << j;
       if (outcome) sum += rays.r[j];
     }
@@ -196,7 +199,9 @@ class PoolChain {
   PoolSpace& space_;
   Fault fault_;
   std::uint32_t count_ = 0;
-  PixelMemory memory_;
+  BlockMemory memory_;
+  PixelNoise noise_;
+  VisibilityTable table_;
 };
 
 }  // namespace baton::HWY_NAMESPACE

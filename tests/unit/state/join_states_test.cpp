@@ -31,8 +31,12 @@ SampleState state_of(const StateFormat& format, const PixelRect& rect, std::int3
         samples.weight[p] = 0.5f;
         samples.site[p] = static_cast<std::uint8_t>(random() % 16);
       }
-      if (&format == &memory_format())
-        memory_plane(state)[i].all_rays = static_cast<VisibilityCell>(random());
+      if (&format == &memory_format()) {
+        noise_plane(state)[i].light = static_cast<std::uint16_t>(random() % 0x7F80);
+        // Of the block: whatever part of it the tile has.
+        VisibilityCell& cell = memory_plane(state)[PixelBlocks(rect).at(x, y)].cells[9];
+        cell.seen = static_cast<std::uint8_t>(1 + y / 4 * 10 + x / 4);
+      }
       if (&format == &weighed_sample_format())
         confidence_plane(state)[i] = static_cast<std::uint16_t>(random());
     }
@@ -44,11 +48,12 @@ TEST(JoinStates, AnyTilingGivesTheBytesOfTheTileItself) {
   const std::array<const StateFormat*, 3> formats{&sample_format(), &weighed_sample_format(),
                                                   &memory_format()};
   for (const StateFormat* const f : formats) {
-    const SampleState a = state_of(*f, {0, 0, 5, 4}, 0), b = state_of(*f, {5, 0, 7, 4}, 1),
-                      c = state_of(*f, {0, 4, 5, 9}, 2), d = state_of(*f, {5, 4, 7, 9}, 3);
+    // Tiles end where blocks do.
+    const SampleState a = state_of(*f, {0, 0, 4, 4}, 0), b = state_of(*f, {4, 0, 7, 4}, 1),
+                      c = state_of(*f, {0, 4, 4, 9}, 2), d = state_of(*f, {4, 4, 7, 9}, 3);
     const std::array parts{&a, &b, &c, &d};
     for (const PixelRect& rect :
-         {PixelRect{0, 0, 7, 9}, {1, 2, 6, 8}, {5, 0, 7, 4}, {4, 3, 6, 5}, {6, 8, 7, 9}}) {
+         {PixelRect{0, 0, 7, 9}, {1, 2, 6, 8}, {4, 0, 7, 4}, {3, 3, 6, 5}, {6, 8, 7, 9}}) {
       const Result<SampleState> joined = join_states(parts, rect, 9);
       ASSERT_TRUE(joined.ok()) << joined.error().message;
       EXPECT_EQ(encode_state(*joined), encode_state(state_of(*f, rect, 9)));

@@ -12,20 +12,15 @@ namespace {
 
 using testing::HasSubstr;
 
-/// One surface pixel whose rays agree, one whose rays do not.
+/// Three pixels in two blocks: one has seen a ray in two of its bins.
 SampleState remembering_state(std::int32_t num_particles = 2) {
   SampleState state = tiny_state();
-  state.resize(memory_format(), {0, 0, 3, 1}, num_particles);
+  state.resize(memory_format(), {2, 0, 5, 1}, num_particles);
   state.source[1] = state.source[2] = PixelSource::carried;
-  PixelMemory& agreed = memory_plane(state)[1];
-  agreed.all_rays = 0x8003;
-  agreed.outcomes = PixelMemory::kSawFree;
-  agreed.lobe_noise = 0x3C01;
-  PixelMemory& disagreed = memory_plane(state)[2];
-  disagreed.bins.cells[5] = 0x1234;
-  disagreed.all_rays = 0x7771;
-  disagreed.outcomes = PixelMemory::kSawBoth;
-  disagreed.light_noise = 0x3B12;
+  noise_plane(state)[1].lobes = 0x3C01;
+  noise_plane(state)[2].light = 0x3B12;
+  memory_plane(state)[1].cells[5] = {12, 3};
+  memory_plane(state)[1].cells[BlockMemory::kCount - 1] = {255, 255};
   return state;
 }
 
@@ -36,19 +31,19 @@ TEST(SampleState, RemembersRays) {
 
 TEST(SampleState, RemembersEveryBin) {
   SampleState state = remembering_state();
-  for (const std::size_t step : {1, 2, 3, 31, 63}) {
-    PixelMemory& memory = memory_plane(state)[2];
-    memory.bins = {};
-    for (std::size_t bin = 0; bin < VisibilityBins::kCount; bin += step)
-      memory.bins.cells[bin] = static_cast<VisibilityCell>(0x1001 + bin);
+  for (const std::size_t step : {1, 2, 3, 31, 63, 511}) {
+    BlockMemory& memory = memory_plane(state)[0];
+    memory = {};
+    for (std::size_t bin = 0; bin < BlockMemory::kCount; bin += step)
+      memory.cells[bin] = {static_cast<std::uint8_t>(1 + bin % 255), 1};
     EXPECT_EQ(*decode_state(encode_state(state), "test"), state) << step;
   }
 }
 
 TEST(SampleState, RefusesMasksThatNameOtherCells) {
   SectionFile file = sections_of(remembering_state());
-  section(file, "VISM").payload[7] = std::byte{0x80};
-  EXPECT_THAT(error_of(file).message, HasSubstr("section VISC has 2 bytes, expected 4"));
+  section(file, "BLKM").payload[7] = std::byte{0x80};
+  EXPECT_THAT(error_of(file).message, HasSubstr("section BLKC has 4 bytes, expected 6"));
 }
 
 TEST(SampleState, KeepsConfidences) {
@@ -78,37 +73,53 @@ TEST(SampleState, StoresOnlyBinsThatRaysReached) {
     }
     return std::uint64_t{0};
   };
-  EXPECT_EQ(raw_bytes(state, "VISM"), 8u);
-  EXPECT_EQ(raw_bytes(state, "VISC"), 2u);
-  EXPECT_EQ(raw_bytes(state, "VISS"), 8u);
+  EXPECT_EQ(raw_bytes(state, "BLKM"), 2 * 64u);
+  EXPECT_EQ(raw_bytes(state, "BLKC"), 4u);
   EXPECT_EQ(raw_bytes(state, "NOIS"), 4u);
   EXPECT_EQ(raw_bytes(state, "NOIL"), 4u);
   state.resize(sample_format(), state.rect, 2);
-  EXPECT_EQ(raw_bytes(state, "VISS"), 0u);
+  EXPECT_EQ(raw_bytes(state, "BLKC"), 0u);
 }
 
-TEST(SampleState, RefusesOutcomesThatCannotBe) {
-  SampleState state = remembering_state();
-  memory_plane(state)[1].outcomes = 4;
-  const auto decoded = decode_state(encode_state(state), "a.bst");
-  ASSERT_FALSE(decoded.ok());
-  EXPECT_THAT(decoded.error().message,
-              HasSubstr("a.bst: section VISS: pixel (1, 0): outcomes 4, expected 0 to 3"));
+TEST(SampleState, RefusesCountsThatCannotBe) {
+  for (const auto& [cell, said] : {std::pair(VisibilityCell{3, 4}, "4 of 3 rays are free"),
+                                   std::pair(VisibilityCell{0, 0}, "0 of 0 rays are free")}) {
+    SectionFile file = sections_of(remembering_state());
+    section(file, "BLKC").payload[0] = std::byte{cell.seen};
+    section(file, "BLKC").payload[1] = std::byte{cell.free};
+    EXPECT_THAT(error_of(file).message,
+                HasSubstr(fmt::format("section BLKC: pixel (4, 0): {}", said)));
+  }
+}
+
+TEST(MemoryFormat, ABlockInheritsHalfOfTheMeanOfItsSources) {
+  SampleState old;
+  old.resize(memory_format(), {0, 0, 8, 4}, 0);
+  memory_plane(old)[0].cells[7] = {100, 60};
+  memory_plane(old)[1].cells[7] = {20, 20};
+  memory_plane(old)[1].cells[300] = {255, 1};
+  SampleState now;
+  now.resize(memory_format(), {0, 0, 4, 4}, 0);
+  const StateFormat::BlockSource sources[] = {{&old, 0, 3}, {&old, 1, 1}};
+  memory_format().inherit_block(sources, now, 0);
+  EXPECT_EQ(memory_plane(now)[0].cells[7], (VisibilityCell{40, 25}));
+  EXPECT_EQ(memory_plane(now)[0].cells[300], (VisibilityCell{31, 0}));
+  EXPECT_EQ(memory_plane(now)[0].cells[8], VisibilityCell());
 }
 
 TEST(SampleState, RefusesNoiseThatIsNoNumber) {
-  const std::pair<std::uint16_t PixelMemory::*, const char*> kinds[] = {
-      {&PixelMemory::light_noise, "NOIS"}, {&PixelMemory::lobe_noise, "NOIL"}};
+  const std::pair<std::uint16_t PixelNoise::*, const char*> kinds[] = {
+      {&PixelNoise::light, "NOIS"}, {&PixelNoise::lobes, "NOIL"}};
   for (const auto& [kind, section] : kinds) {
     for (const std::uint16_t noise :
          {std::uint16_t{0x7F80}, std::uint16_t{0x8001}}) {  // infinite, negative
       SampleState state = remembering_state();
-      memory_plane(state)[2].*kind = noise;
+      noise_plane(state)[2].*kind = noise;
       const auto decoded = decode_state(encode_state(state), "a.bst");
       ASSERT_FALSE(decoded.ok());
       EXPECT_THAT(decoded.error().message,
                   HasSubstr(fmt::format(
-                      "a.bst: section {}: pixel (2, 0): noise {:#06x}, expected 0 to 0x7f7f",
+                      "a.bst: section {}: pixel (4, 0): noise {:#06x}, expected 0 to 0x7f7f",
                       section, noise)));
     }
   }

@@ -19,23 +19,25 @@ struct Carrying {
 const Carrying kCarrying[] = {
     {Method::sequential, sample_format(), 2 * 9 + 6 * 9},
     {Method::restir, weighed_sample_format(), 2 * 9 + 6 * 9 + 2},
-    {Method::pool, memory_format(), 2 * 9 + 6 * 9 + sizeof(PixelMemory)},
+    {Method::pool, memory_format(), 2 * 9 + 6 * 9 + sizeof(PixelNoise)},
 };
 
 TEST(SampleState, SizeOfAPixelIsThatOfItsPlanes) {
   for (const auto& [method, format, pixel_bytes] : kCarrying) {
     SampleState state;
     state.resize(format, {0, 0, 5, 2}, 6, 2);
-    EXPECT_EQ(state.size_bytes(), 10 * pixel_bytes);
+    const bool has_blocks = method == Method::pool;
+    EXPECT_EQ(state.size_bytes(), 10 * pixel_bytes + (has_blocks ? 2 * sizeof(BlockMemory) : 0));
+    EXPECT_EQ(format.most_stored_bytes(6, 2), pixel_bytes);
     // A file says which bins it has, too.
-    const std::size_t in_a_file = method == Method::pool ? 8 : 0;
-    EXPECT_EQ(format.most_stored_bytes(6, 2), pixel_bytes + in_a_file);
+    EXPECT_EQ(format.most_stored_block_bytes(), has_blocks ? sizeof(BlockMemory) + 64 : 0);
   }
 }
 
 TEST(SampleState, SizesOfEstimatesAreThoseOfTheFormats) {
   for (const auto& [method, format, pixel_bytes] : kCarrying) {
-    EXPECT_EQ(format.most_stored_bytes(6, 2),
+    constexpr std::size_t kBlock = std::size_t{PixelBlocks::kSide} * PixelBlocks::kSide;
+    EXPECT_EQ(format.most_stored_bytes(6, 2) + format.most_stored_block_bytes() / kBlock,
               sample_format().most_stored_bytes(6, 2) +
                   static_cast<std::size_t>(traits(method).most_bytes_beside_samples));
   }

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "common/state/pixel_memory.h"
 #include "worker/light/candidates.h"
 #include "worker/sampling/pixel_rays.h"
 #include "worker/sampling/pool.h"
+#include "worker/sampling/visibility_table.h"
 
 namespace baton::kernels {
 
@@ -17,7 +17,7 @@ struct PoolScratch {
 /// sampling/pool-inl.h, which says what u, num_rays, memory and the answer are. num_rays: N,
 /// [1, kMaxParticles].
 float choose_pool_rays(const PoolTuning& tuning, const CandidateSource& from, float u,
-                       std::int32_t num_rays, const PixelMemory& memory, PoolScratch& scratch,
+                       std::int32_t num_rays, const VisibilityTable& memory, PoolScratch& scratch,
                        PixelRays& out);
 
 }  // namespace baton::kernels

@@ -7,7 +7,7 @@
 #include "common/state/memory_plane.h"
 #include "worker/method/fresh/candidate_samplers.h"
 #include "worker/sampling/light_noise.h"
-#include "worker/sampling/visibility_memory.h"
+#include "worker/sampling/visibility_table.h"
 
 namespace baton {
 namespace {
@@ -50,28 +50,38 @@ PixelMethod make_pool_method(const JobSpec& job, const PoolTuning& tuning) {
           }};
 }
 
-/// Null: it remembers nothing.
-PixelMemory* PoolSampler::memory_of(const PixelState& pixel) const {
-  return remembers_ ? &memory_plane(pixel.tile)[pixel.index] : nullptr;
+const VisibilityTable& PoolSampler::table_of(const PixelState& pixel) {
+  const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
+  if (!has_table_ || block != block_) {
+    table_.read(memory_plane(pixel.tile)[block], tuning_.prior_rays);
+    block_ = block;
+    has_table_ = true;
+  }
+  return table_;
 }
 
-/// Prefetches what the pixel remembers: the memories of a tile are larger than the caches.
+/// Prefetches what the pixel's block remembers, where the one in work is of another: the memories
+/// of a tile are larger than the caches.
 void PoolSampler::look_ahead(const RoundLight& /*light*/, bool /*has_history*/,
                              const PixelState& pixel) {
-  const auto* const bytes = reinterpret_cast<const std::byte*>(memory_of(pixel));
-  if (bytes == nullptr) return;
-  for (std::size_t at = 0; at < sizeof(PixelMemory); at += 64) __builtin_prefetch(bytes + at);
+  if (!remembers_) return;
+  const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
+  if (has_table_ && block == block_) return;
+  const auto* const bytes =
+      reinterpret_cast<const std::byte*>(&std::as_const(memory_plane(pixel.tile)[block]));
+  for (std::size_t at = 0; at < sizeof(BlockMemory); at += 64) __builtin_prefetch(bytes + at);
 }
 
 PixelDiagnostics PoolSampler::sample(const PixelInput& input, const PixelState& pixel,
                                      RayWriter& rays) {
-  static const PixelMemory kNothing{};
+  static const VisibilityTable kNothing{};
   poison(scratch_);
   poison(rays_);
-  PixelMemory* const own = memory_of(pixel);
-  const PixelMemory& memory = own != nullptr ? *own : kNothing;
-  const kernels::CandidateCounts counts = counts_for_noise(tuning_, input.sites, num_candidates_,
-                                                           lobe_fraction_, light_variance(memory));
+  PixelNoise* const own = remembers_ ? &noise_plane(pixel.tile)[pixel.index] : nullptr;
+  const VisibilityTable& memory = remembers_ ? table_of(pixel) : kNothing;
+  const kernels::CandidateCounts counts =
+      counts_for_noise(tuning_, input.sites, num_candidates_, lobe_fraction_,
+                       light_variance(own != nullptr ? *own : PixelNoise{}));
   const kernels::CandidateSource candidates = candidate_source(input, counts);
   const float total = kernels::choose_pool_rays(tuning_, candidates,
                                                 Rng(input.key, PassId::choose).uniforms(0, 0)[0],
@@ -83,7 +93,9 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, const PixelState& 
 }
 
 void PoolSampler::learn(const FoundRays& found, const PixelState& pixel) {
-  if (PixelMemory* const own = memory_of(pixel)) remember_rays(*own, found.tag, found.is_free);
+  if (!remembers_) return;
+  const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
+  remember_rays(memory_plane(pixel.tile)[block], found.tag, found.is_free);
 }
 
 }  // namespace baton

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/math/pixel_blocks.h"
+#include "worker/pass/round_pixels.h"
+
+namespace baton {
+
+/// The order in which the pixels of a round are worked on, in batches: slots of the round. Where
+/// blocks have a memory in common, block by block, and the pixels of a block are in one batch, so
+/// that they all start from what the rounds before have left; else as they come.
+class PixelOrder {
+ public:
+  /// most: pixels of a batch, at least those of a block.
+  PixelOrder(const PixelRect& rect, const RoundPixels& pixels, bool by_blocks, std::size_t most);
+
+  std::size_t num_batches() const { return ends_.size(); }
+  std::span<const std::uint32_t> batch(std::size_t i) const {
+    const std::size_t first = i == 0 ? 0 : ends_[i - 1];
+    return std::span(slots_).subspan(first, ends_[i] - first);
+  }
+
+ private:
+  std::vector<std::uint32_t> slots_;
+  std::vector<std::size_t> ends_;  ///< (batches)
+};
+
+}  // namespace baton
