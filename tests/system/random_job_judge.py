@@ -23,6 +23,7 @@ AUTO_DEADLINE_S = 10 * JOB_DEADLINE_S
 # Exit code of a `baton render` that was asked to stop.
 CANCELLED = 3
 # What a worker says that has too little memory for a job, rather than for what it would keep.
+BLOCK = 4  # side of the blocks of pixels that have a memory in common
 NO_ROOM = "does not fit into memory"
 # How each fault of a job or of its files begins.
 FAULT_LINE = re.compile(r"\S.*: .")
@@ -157,9 +158,8 @@ class Judge:
         require(len(frames) == predicted["frames"], "frames", f"{len(frames)} files, expected {predicted['frames']}")
         judge_frames(frames, case["job"], predicted)
         if name == "first" and not is_auto(case["job"]):
-            side = int(json.loads(command[2].read_text(encoding="utf-8"))["image"]["tileSize"])
-            width, height = rendered_size(case["job"]["image"])
-            judge_states(work, min(side, width) * min(side, height), predicted)
+            side = -(-int(json.loads(command[2].read_text(encoding="utf-8"))["image"]["tileSize"]) // BLOCK) * BLOCK
+            judge_states(work, [min(side, length) for length in rendered_size(case["job"]["image"])], predicted)
         return frames
 
 
@@ -325,10 +325,12 @@ def compare_prediction(predicted, summary, job):
             f"{stats['raysShadow']}, predicted at most {shadow}")
 
 
-def judge_states(work, tile_pixels, predicted):
-    """What states hold is at most what was predicted."""
+def judge_states(work, sides, predicted):
+    """What states hold is at most what was predicted. sides: of the largest tile."""
     states = [size for size in map(raw_state_bytes, work.rglob("*.blob")) if size is not None]
-    most = tile_pixels * predicted["stateBytesPerPixel"] + 4
+    tile_pixels = sides[0] * sides[1]
+    blocks = ((sides[0] + 2 * BLOCK - 2) // BLOCK) * ((sides[1] + 2 * BLOCK - 2) // BLOCK)
+    most = tile_pixels * predicted["stateBytesPerPixel"] + blocks * predicted["stateBytesPerBlock"] + 4
     require(not states or max(states) <= most, "predicted state bytes",
             f"{max(states, default=0)} bytes in a tile of at most {tile_pixels} pixels, predicted {most}")
 

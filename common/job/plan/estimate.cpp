@@ -6,6 +6,7 @@
 #include "common/job/aov.h"
 #include "common/job/motion.h"
 #include "common/job/plan/sequence.h"
+#include "common/math/pixel_blocks.h"
 #include "common/state/sample_planes.h"
 
 namespace baton {
@@ -85,8 +86,18 @@ JobEstimate estimate_job(const JobSpec& job) {
   if (carries_state(job)) {
     // What is stored of a pixel's particles is hardly smaller; its memory is, by half and more.
     e.state_bytes_per_pixel = state_bytes_per_pixel(job);
-    e.state_bytes = pixels * e.state_bytes_per_pixel;
-    e.largest_blob_bytes = std::max(e.largest_blob_bytes, tile_pixels * e.state_bytes_per_pixel);
+    e.state_bytes_per_block = traits(job.sampling.method).most_block_bytes;
+    const auto bytes = [&](std::int64_t num_pixels, std::int64_t num_blocks) {
+      return num_pixels * e.state_bytes_per_pixel + num_blocks * e.state_bytes_per_block;
+    };
+    e.state_bytes = bytes(pixels, static_cast<std::int64_t>(PixelBlocks(image).count()));
+    // So many pixels in a row touch at most so many blocks.
+    const auto most_blocks = [&](std::int64_t length) {
+      return (std::min(side, length) + 2 * PixelBlocks::kSide - 2) / PixelBlocks::kSide;
+    };
+    e.tile_state_bytes =
+        bytes(tile_pixels, most_blocks(image.width()) * most_blocks(image.height()));
+    e.largest_blob_bytes = std::max(e.largest_blob_bytes, e.tile_state_bytes);
   }
   return e;
 }

@@ -84,6 +84,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"filmBytesPerFrame", e.film_bytes},
                          {"frameBytes", e.frame_bytes},
                          {"stateBytesPerPixel", e.state_bytes_per_pixel},
+                         {"stateBytesPerBlock", e.state_bytes_per_block},
                          {"stateBytes", e.state_bytes},
                          {"storeBytes", estimate_store(job, share).total()},
                          {"storeBytesMost", bound_store(job).total()},
@@ -200,7 +201,9 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
     fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);
   }
   if (e.state_bytes > 0) {
-    fmt::print("state      at most {} bytes a pixel\n", e.state_bytes_per_pixel);
+    fmt::print("state      at most {:.0f} bytes a pixel\n",
+               static_cast<double>(e.state_bytes) /
+                   static_cast<double>(job.image.rendered().area()));
   }
   fmt::print("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
   const StoreEstimate store = estimate_store(job, surface_share(job, *assets.scene));

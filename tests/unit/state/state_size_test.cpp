@@ -36,8 +36,9 @@ TEST(SampleState, SizeOfAPixelIsThatOfItsPlanes) {
 
 TEST(SampleState, SizesOfEstimatesAreThoseOfTheFormats) {
   for (const auto& [method, format, pixel_bytes] : kCarrying) {
-    constexpr std::size_t kBlock = std::size_t{PixelBlocks::kSide} * PixelBlocks::kSide;
-    EXPECT_EQ(format.most_stored_bytes(6, 2) + format.most_stored_block_bytes() / kBlock,
+    EXPECT_EQ(format.most_stored_block_bytes(),
+              static_cast<std::size_t>(traits(method).most_block_bytes));
+    EXPECT_EQ(format.most_stored_bytes(6, 2),
               sample_format().most_stored_bytes(6, 2) +
                   static_cast<std::size_t>(traits(method).most_bytes_beside_samples));
   }
