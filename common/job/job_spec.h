@@ -357,7 +357,7 @@ struct StateSpec {
   /// Frames between checkpoints and, at rest, of a lease, [1, 1000].
   int checkpoint_every = 12;
   /// pool: rounds before the first frame that are not seen, [0, limits::kMaxPreroll].
-  int preroll = 2;
+  int preroll = 4;
   StateKeep keep = StateKeep::last;  ///< `all`: every checkpoint stays
 
   bool operator==(const StateSpec&) const = default;

@@ -9,8 +9,12 @@
 namespace baton {
 namespace {
 
-constexpr SectionTag kMasks{'B', 'L', 'K', 'M'};
-constexpr SectionTag kCells{'B', 'L', 'K', 'C'};
+/// Of a plane of blocks: which bins there are, and their cells.
+struct BlockTags {
+  SectionTag masks, cells;
+};
+constexpr BlockTags kBlockTags[] = {{{'B', 'L', 'K', 'M'}, {'B', 'L', 'K', 'C'}},
+                                    {{'C', 'A', 'T', 'M'}, {'C', 'A', 'T', 'C'}}};
 constexpr SectionTag kLightNoise{'N', 'O', 'I', 'S'};
 constexpr SectionTag kLobeNoise{'N', 'O', 'I', 'L'};
 constexpr std::size_t kNoiseStride = sizeof(std::uint16_t);
@@ -55,29 +59,9 @@ std::size_t first_pixel(const PixelRect& rect, std::size_t block) {
   return static_cast<std::size_t>((pixels.y0 - rect.y0) * rect.width() + pixels.x0 - rect.x0);
 }
 
-}  // namespace
-
-std::vector<std::size_t> MemoryFormat::pixel_bytes(std::int32_t num_particles,
-                                                   std::int32_t num_populations) const {
-  std::vector<std::size_t> sizes = SampleFormat::pixel_bytes(num_particles, num_populations);
-  sizes.push_back(sizeof(PixelNoise));
-  return sizes;
-}
-
-std::size_t MemoryFormat::most_stored_block_bytes() const {
-  return kMasksOfBlock * sizeof(BinMask) + sizeof(BlockMemory);
-}
-
-std::vector<SectionTag> MemoryFormat::tags() const {
-  std::vector<SectionTag> tags = SampleFormat::tags();
-  tags.insert(tags.end(), {kMasks, kCells, kLightNoise, kLobeNoise});
-  return tags;
-}
-
-void MemoryFormat::encode(const SampleState& state, StateWriter& out) const {
-  SampleFormat::encode(state, out);
-  ByteWriter masks, cells, light_noise, lobe_noise;
-  for (const BlockMemory& memory : memory_plane(state)) {
+void encode_blocks(std::span<const BlockMemory> memories, const BlockTags& tags, StateWriter& out) {
+  ByteWriter masks, cells;
+  for (const BlockMemory& memory : memories) {
     for (std::size_t first = 0; first < BlockMemory::kCount; first += kBinsOfMask) {
       std::array<VisibilityCell, kBinsOfMask> seen;
       BinMask mask = 0;
@@ -92,36 +76,25 @@ void MemoryFormat::encode(const SampleState& state, StateWriter& out) const {
       cells.put_raw(std::as_bytes(std::span(seen).first(count)));
     }
   }
-  const std::span<const PixelNoise> noises = noise_plane(state);
-  for (const std::size_t pixel : out.pixels()) {
-    light_noise.put(noises[pixel].light);
-    lobe_noise.put(noises[pixel].lobes);
-  }
-  out.add(kMasks, 1, masks.take());
-  out.add(kCells, sizeof(VisibilityCell), cells.take());
-  out.add(kLightNoise, kNoiseStride, light_noise.take());
-  out.add(kLobeNoise, kNoiseStride, lobe_noise.take());
+  out.add(tags.masks, 1, masks.take());
+  out.add(tags.cells, sizeof(VisibilityCell), cells.take());
 }
 
-Status MemoryFormat::decode(const StateReader& from, SampleState& state) const {
-  BATON_TRY(SampleFormat::decode(from, state));
-  const std::size_t num_masks = state.num_blocks() * kMasksOfBlock;
-  BATON_ASSIGN(const Column masks, column(from, kMasks, num_masks * sizeof(BinMask)));
+Status decode_blocks(const StateReader& from, const BlockTags& tags, const PixelRect& rect,
+                     std::span<BlockMemory> memories) {
+  const std::size_t num_masks = memories.size() * kMasksOfBlock;
+  BATON_ASSIGN(const Column masks, column(from, tags.masks, num_masks * sizeof(BinMask)));
   std::size_t num_cells = 0;
   for (std::size_t i = 0; i < num_masks; ++i)
     num_cells += static_cast<std::size_t>(std::popcount(masks.at<BinMask>(i)));
-  BATON_ASSIGN(const Column cells, column(from, kCells, num_cells * sizeof(VisibilityCell)));
-  BATON_ASSIGN(const Column light, noises_of(from, kLightNoise));
-  BATON_ASSIGN(const Column lobes, noises_of(from, kLobeNoise));
-
+  BATON_ASSIGN(const Column cells, column(from, tags.cells, num_cells * sizeof(VisibilityCell)));
   std::size_t next_cell = 0;
-  const std::span<BlockMemory> memories = memory_plane(state);
   for (std::size_t i = 0; i < num_masks; ++i) {
     const std::size_t block = i / kMasksOfBlock, first = i % kMasksOfBlock * kBinsOfMask;
     for (BinMask left = masks.at<BinMask>(i); left != 0; left &= left - 1) {
       const auto cell = cells.at<VisibilityCell>(next_cell++);
       if (cell.seen == 0 || cell.free > cell.seen) {
-        return from.wrong_value(kCells, first_pixel(state.rect, block),
+        return from.wrong_value(tags.cells, first_pixel(rect, block),
                                 fmt::format("{} of {} rays are free, expected some, and no more "
                                             "free ones than there are",
                                             cell.free, cell.seen));
@@ -129,6 +102,51 @@ Status MemoryFormat::decode(const StateReader& from, SampleState& state) const {
       memories[block].cells[first + static_cast<std::size_t>(std::countr_zero(left))] = cell;
     }
   }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::size_t> MemoryFormat::pixel_bytes(std::int32_t num_particles,
+                                                   std::int32_t num_populations) const {
+  std::vector<std::size_t> sizes = SampleFormat::pixel_bytes(num_particles, num_populations);
+  sizes.push_back(sizeof(PixelNoise));
+  return sizes;
+}
+
+std::size_t MemoryFormat::most_stored_block_bytes() const {
+  return num_planes() * (kMasksOfBlock * sizeof(BinMask) + sizeof(BlockMemory));
+}
+
+std::vector<SectionTag> MemoryFormat::tags() const {
+  std::vector<SectionTag> tags = SampleFormat::tags();
+  for (std::size_t plane = 0; plane < num_planes(); ++plane)
+    tags.insert(tags.end(), {kBlockTags[plane].masks, kBlockTags[plane].cells});
+  tags.insert(tags.end(), {kLightNoise, kLobeNoise});
+  return tags;
+}
+
+void MemoryFormat::encode(const SampleState& state, StateWriter& out) const {
+  SampleFormat::encode(state, out);
+  for (std::size_t plane = 0; plane < num_planes(); ++plane)
+    encode_blocks(memory_plane(state, plane == 1), kBlockTags[plane], out);
+  ByteWriter light_noise, lobe_noise;
+  const std::span<const PixelNoise> noises = noise_plane(state);
+  for (const std::size_t pixel : out.pixels()) {
+    light_noise.put(noises[pixel].light);
+    lobe_noise.put(noises[pixel].lobes);
+  }
+  out.add(kLightNoise, kNoiseStride, light_noise.take());
+  out.add(kLobeNoise, kNoiseStride, lobe_noise.take());
+}
+
+Status MemoryFormat::decode(const StateReader& from, SampleState& state) const {
+  BATON_TRY(SampleFormat::decode(from, state));
+  for (std::size_t plane = 0; plane < num_planes(); ++plane) {
+    BATON_TRY(decode_blocks(from, kBlockTags[plane], state.rect, memory_plane(state, plane == 1)));
+  }
+  BATON_ASSIGN(const Column light, noises_of(from, kLightNoise));
+  BATON_ASSIGN(const Column lobes, noises_of(from, kLobeNoise));
   const std::span<PixelNoise> noises = noise_plane(state);
   for (std::size_t i = 0; i < from.pixels().size(); ++i)
     noises[from.pixels()[i]] = {light.at<std::uint16_t>(i), lobes.at<std::uint16_t>(i)};
@@ -137,28 +155,34 @@ Status MemoryFormat::decode(const StateReader& from, SampleState& state) const {
 
 void MemoryFormat::inherit_block(std::span<const BlockSource> sources, SampleState& state,
                                  std::size_t block) const {
-  BlockMemory& memory = memory_plane(state)[block];
-  std::uint32_t of_all = 0;
-  for (const BlockSource& source : sources) of_all += static_cast<std::uint32_t>(source.num_pixels);
-  // Fixed point, rounded down: no bin gets more free rays than rays.
-  std::array<std::uint32_t, BlockMemory::kCount> seen{}, free{};
-  for (const BlockSource& source : sources) {
-    const BlockMemory& old = memory_plane(*source.state)[source.block];
-    const auto share = static_cast<std::uint32_t>(source.num_pixels) * (1u << 15) / of_all;
-    for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
-      seen[i] += share * old.cells[i].seen;
-      free[i] += share * old.cells[i].free;
+  for (const bool catchers : {false, true}) {
+    std::uint32_t of_all = 0;
+    for (const BlockSource& source : sources) {
+      if (source.for_catchers == catchers) of_all += static_cast<std::uint32_t>(source.num_pixels);
     }
-  }
-  for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
-    memory.cells[i] = {static_cast<std::uint8_t>(seen[i] >> 16),
-                       static_cast<std::uint8_t>(free[i] >> 16)};
+    if (of_all == 0) continue;
+    // Fixed point, rounded down: no bin gets more free rays than rays.
+    std::array<std::uint32_t, BlockMemory::kCount> seen{}, free{};
+    for (const BlockSource& source : sources) {
+      if (source.for_catchers != catchers) continue;
+      const BlockMemory& old = memory_plane(*source.state, catchers)[source.block];
+      const auto share = static_cast<std::uint32_t>(source.num_pixels) * (1u << 15) / of_all;
+      for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
+        seen[i] += share * old.cells[i].seen;
+        free[i] += share * old.cells[i].free;
+      }
+    }
+    BlockMemory& memory = memory_plane(state, catchers)[block];
+    for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
+      memory.cells[i] = {static_cast<std::uint8_t>(seen[i] >> 16),
+                         static_cast<std::uint8_t>(free[i] >> 16)};
+    }
   }
 }
 
-const MemoryFormat& memory_format() {
-  static const MemoryFormat format;
-  return format;
+const MemoryFormat& memory_format(bool has_catchers) {
+  static const MemoryFormat plain(false), with_catchers(true);
+  return has_catchers ? with_catchers : plain;
 }
 
 }  // namespace baton

@@ -8,13 +8,18 @@
 namespace baton {
 
 /// What blocks of pixels remember of their rays, and pixels of the noise of their light, beside Lns
-/// and, if any, samples. In a file a block has the bins that have seen a ray.
+/// and, if any, samples. In a file a block has the bins that have seen a ray. Where there are
+/// catchers of shadows, their pixels have a memory of their own in each block: objects must look
+/// the same without them.
 class MemoryFormat final : public SampleFormat {
  public:
+  explicit MemoryFormat(bool has_catchers) : has_catchers_(has_catchers) {}
   std::int32_t fewest_particles() const override { return 0; }
   std::vector<std::size_t> pixel_bytes(std::int32_t num_particles,
                                        std::int32_t num_populations) const override;
-  std::vector<std::size_t> block_bytes() const override { return {sizeof(BlockMemory)}; }
+  std::vector<std::size_t> block_bytes() const override {
+    return std::vector<std::size_t>(num_planes(), sizeof(BlockMemory));
+  }
   std::size_t most_stored_block_bytes() const override;
   std::vector<SectionTag> tags() const override;
   void encode(const SampleState& state, StateWriter& out) const override;
@@ -25,8 +30,13 @@ class MemoryFormat final : public SampleFormat {
   /// past what has moved since.
   void inherit_block(std::span<const BlockSource> sources, SampleState& state,
                      std::size_t block) const override;
+
+ private:
+  std::size_t num_planes() const { return has_catchers_ ? 2 : 1; }
+
+  bool has_catchers_;
 };
-const MemoryFormat& memory_format();
+const MemoryFormat& memory_format(bool has_catchers = false);
 
 /// (pixels) of a state of memory_format().
 inline std::span<PixelNoise> noise_plane(SampleState& state) {
@@ -36,12 +46,13 @@ inline std::span<const PixelNoise> noise_plane(const SampleState& state) {
   return state.planes[SampleFormat::kNumPlanes].values<PixelNoise>();
 }
 
-/// (blocks) of a state of memory_format().
-inline std::span<BlockMemory> memory_plane(SampleState& state) {
-  return state.block_planes[0].values<BlockMemory>();
+/// (blocks) of a state of memory_format(), of the pixels that see a catcher or of the others.
+inline std::span<BlockMemory> memory_plane(SampleState& state, bool of_catchers = false) {
+  return state.block_planes[of_catchers ? 1 : 0].values<BlockMemory>();
 }
-inline std::span<const BlockMemory> memory_plane(const SampleState& state) {
-  return state.block_planes[0].values<BlockMemory>();
+inline std::span<const BlockMemory> memory_plane(const SampleState& state,
+                                                 bool of_catchers = false) {
+  return state.block_planes[of_catchers ? 1 : 0].values<BlockMemory>();
 }
 
 }  // namespace baton

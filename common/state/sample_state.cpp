@@ -123,6 +123,7 @@ Result<SampleState> decode_sections(const SectionFile& file, const std::string& 
 
 /// Whose sections the file has. Those that no format knows are refused by the plainest one.
 const StateFormat& format_of(const SectionFile& file) {
+  if (file.find({'C', 'A', 'T', 'M'}) != nullptr) return memory_format(true);
   for (const StateFormat* format : {static_cast<const StateFormat*>(&memory_format()),
                                     static_cast<const StateFormat*>(&weighed_sample_format())}) {
     std::vector<SectionTag> own = format->tags();

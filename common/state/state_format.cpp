@@ -36,8 +36,7 @@ void StateWriter::gather(const SectionTag& tag, std::size_t stride, const StateP
   Bytes payload;
   payload.reserve(pixels_.size() * plane.each_bytes);
   for (const std::size_t pixel : pixels_) {
-    const ByteView row =
-        ByteView(plane.bytes).subspan(pixel * plane.each_bytes, plane.each_bytes);
+    const ByteView row = ByteView(plane.bytes).subspan(pixel * plane.each_bytes, plane.each_bytes);
     payload.insert(payload.end(), row.begin(), row.end());
   }
   add(tag, stride, std::move(payload));

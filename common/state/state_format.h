@@ -90,13 +90,15 @@ class StateFormat {
   virtual void move_to_sites(SampleState& /*state*/, std::size_t /*pixel*/,
                              const HeirOf& /*heir_of*/) const {}
 
-  /// A block of the frame before, and how many pixels of a block of now come from it.
+  /// A block of the frame before, and how many pixels of a block of now come from it: those that
+  /// see a catcher of shadows, or the others.
   struct BlockSource {
     const SampleState* state;
     std::size_t block;
+    bool for_catchers;
     std::int32_t num_pixels;
   };
-  /// Fills what a block carries, all zero, where surfaces have moved. sources: not empty.
+  /// Fills what a block carries, all zero, where surfaces have moved.
   virtual void inherit_block(std::span<const BlockSource> /*sources*/, SampleState& /*state*/,
                              std::size_t /*block*/) const {}
 };

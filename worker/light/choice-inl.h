@@ -23,9 +23,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Weighs the candidates from the presampled light of a pixel that sees diffuse surfaces alone:
 /// cosine times reflected light over density, and nothing else. line: has Add(code,
-/// inverse_density, weight, add_color), where add_color(share, sum) adds share w (f cos L)_rgb / p~ to a sum of colours, and
-/// kHasColors: it keeps such a sum, `colors`, which the albedo is multiplied to once for all. A
-/// copy of the line that stays in registers is what adds.
+/// inverse_density, weight, add_color), where add_color(share, sum) adds share w (f cos L)_rgb / p~
+/// to a sum of colours, and kHasColors: it keeps such a sum, `colors`, which the albedo is
+/// multiplied to once for all. A copy of the line that stays in registers is what adds.
 template <class Line>
 HWY_INLINE void WeighDiffuse(const kernels::CandidateSource& from, Line& line) {
   const auto& [sites, environment, presampled, counts, random] = from;

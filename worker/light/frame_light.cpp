@@ -93,10 +93,9 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
                     b->height(), a->width(), a->height(),
                     job_.environment.keys[static_cast<std::size_t>(frame.map_a)].map)};
   }
-  return mixed_maps_.insert(name,
-                            std::make_shared<const EnvironmentMap>(
-                                *a, *b, frame.mix, frame.scale, job_.sampling.mis_compensation,
-                                capped_share_));
+  return mixed_maps_.insert(
+      name, std::make_shared<const EnvironmentMap>(*a, *b, frame.mix, frame.scale,
+                                                   job_.sampling.mis_compensation, capped_share_));
 }
 
 HiddenCone LightSequence::hidden_in(const FrameSpec& frame) {

@@ -7,8 +7,8 @@ namespace baton {
 Result<MapCache::MapPtr> MapCache::get(const std::string& path, const EnvironmentSpec& environment,
                                        bool compensate, const HiddenCone& hidden,
                                        float capped_share) {
-  const Key key{path,       environment.filter, environment.scale, environment.max_width,
-                compensate, hidden,             capped_share};
+  const Key key{path,   environment.filter, environment.scale, environment.max_width, compensate,
+                hidden, capped_share};
   const std::lock_guard lock(reading_);
   if (MapPtr found = maps_.find(key)) return found;
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));

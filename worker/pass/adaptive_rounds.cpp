@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-
 namespace baton {
 
 AdaptiveRounds::AdaptiveRounds(const JobSpec& job, const PixelRect& rect)

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/job/job_spec.h"
 #include "common/base/limits.h"
+#include "common/job/job_spec.h"
 #include "common/math/pixel_blocks.h"
 #include "common/math/pixel_rect.h"
 #include "worker/pass/round_mean.h"
@@ -38,8 +38,8 @@ class AdaptiveRounds {
 
  private:
   const PixelRect rect_;
-  const std::int32_t rounds_;                  ///< K
-  const std::optional<float> threshold_;       ///< T
+  const std::int32_t rounds_;             ///< K
+  const std::optional<float> threshold_;  ///< T
   const PixelBlocksOf<limits::kAdaptiveBlock> blocks_;
   std::vector<std::int32_t> rounds_of_block_;  ///< after the judging ones; empty: all
 };

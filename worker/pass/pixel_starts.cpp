@@ -22,8 +22,7 @@ bool PixelStarts::find(std::size_t i, std::size_t slot, SampleState& state) {
   poison(found.old);
   found.history = PixelHistory::none;
   if (work_.at.history != nullptr) {
-    found.history =
-        work_.at.history->take(i, index, work_.catchers_before, state, found.old);
+    found.history = work_.at.history->take(i, index, work_.catchers_before, state, found.old);
   } else if (work_.at.goes_on) {
     if (is_of_its_kind(sees_catcher, state, index)) {
       found.history = PixelHistory::same;

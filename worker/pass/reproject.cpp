@@ -128,16 +128,18 @@ void Reprojection::inherit_blocks(const TileSurfaces& surfaces,
       if (slots_[i].history == PixelHistory::none) continue;
       const OldPixels::Place& old = *slots_[i].old;
       const std::size_t from = PixelBlocks(old.state->rect).of(old.index);
+      const bool sees_catcher = surfaces.first_surface(slots[i]).is_catcher;
       const auto known = std::ranges::find_if(sources, [&](const StateFormat::BlockSource& source) {
-        return source.state == old.state && source.block == from;
+        return source.state == old.state && source.block == from &&
+               source.for_catchers == sees_catcher;
       });
       if (known != sources.end()) {
         ++known->num_pixels;
       } else {
-        sources.push_back({old.state, from, 1});
+        sources.push_back({old.state, from, sees_catcher, 1});
       }
     }
-    if (!sources.empty()) state.format->inherit_block(sources, state, block);
+    state.format->inherit_block(sources, state, block);
   }
 }
 

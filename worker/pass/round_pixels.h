@@ -15,8 +15,8 @@ class RoundPixels {
   /// None so far.
   RoundPixels() = default;
 
-  /// Adds a pixel, in the order in which they are worked on. index: row by row in the tile. weight: rounds that it stands for, >
-  /// 0.
+  /// Adds a pixel, in the order in which they are worked on. index: row by row in the tile. weight:
+  /// rounds that it stands for, > 0.
   void add(std::size_t index, double weight) {
     index_.push_back(static_cast<std::uint32_t>(index));
     weight_.push_back(weight);

@@ -111,8 +111,7 @@ class TileWalk {
     for (Round round = first; round < Round(context_.job.quality.rounds); ++round) {
       if (stop_.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
       if (round == Round(limits::kJudgingRounds)) adaptive.judge(film);
-      RoundPixels pixels =
-          round < Round(0) ? preroll_pixels(rect_, round) : adaptive.pixels(round);
+      RoundPixels pixels = round < Round(0) ? preroll_pixels(rect_, round) : adaptive.pixels(round);
       if (round >= Round(0) && pixels.size() == 0) break;
       BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));
       const bool is_seen = round >= Round(0);

@@ -28,8 +28,7 @@ std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
                std::min(sites_of(job.image.most_sites()), limits::kMaxSitesAtOnce));
   const auto surface_bytes =
       static_cast<std::int64_t>(TileSurfaces::size_bytes(num_sites, any_detail));
-  const std::int64_t tile_bytes =
-      surface_bytes + pixels * 4 * e.film_channels + e.tile_state_bytes;
+  const std::int64_t tile_bytes = surface_bytes + pixels * 4 * e.film_channels + e.tile_state_bytes;
   const std::int64_t plate_bytes =
       has_plate(job.output) ? std::int64_t{12} * job.image.width * job.image.height : 0;
   return static_cast<std::uint64_t>(num_threads * tile_bytes + e.film_bytes + e.frame_bytes +

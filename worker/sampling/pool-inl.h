@@ -214,12 +214,11 @@ HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates
   const float expected = mean(visible);
   const bool control = use_control(tuning, expected, total_deviation);
   const float scale = noise_scale(tuning, expected, candidates.mean_radiance);
-  const RayPlan plan{control ? deviation : contribution,
-                     control ? total_deviation : contribution.Finish(), control,
-                     memory.knows_rays
-                         ? rays_for_deviation(tuning, num_rays, total_deviation, scale)
-                         : num_rays,
-                     lns};
+  const RayPlan plan{
+      control ? deviation : contribution, control ? total_deviation : contribution.Finish(),
+      control,
+      memory.knows_rays ? rays_for_deviation(tuning, num_rays, total_deviation, scale) : num_rays,
+      lns};
   out.light_variance = {VarianceOfOne(lines.light_bends, candidates.from_light, scale),
                         VarianceOfOne(lines.bends, candidates.from_bsdf, scale)};
   if (control) out.constant = {visible, expected / lns};

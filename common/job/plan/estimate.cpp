@@ -6,7 +6,6 @@
 #include "common/job/aov.h"
 #include "common/job/motion.h"
 #include "common/job/plan/sequence.h"
-#include "common/math/pixel_blocks.h"
 #include "common/state/sample_planes.h"
 
 namespace baton {
@@ -79,14 +78,16 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.frame_bytes = pixels * ((frame_channels - wide_channels) * sample_bytes + wide_channels * 4);
 
   // Size the state and the largest blob.
-  const std::int64_t side = job.image.tile_size;
+  const std::int64_t side = TileGrid(job.image).tile_size();
   const std::int64_t tile_pixels =
       std::min<std::int64_t>(side, image.width()) * std::min<std::int64_t>(side, image.height());
   e.largest_blob_bytes = tile_pixels * e.film_channels * 4;
   if (carries_state(job)) {
     // What is stored of a pixel's particles is hardly smaller; its memory is, by half and more.
     e.state_bytes_per_pixel = state_bytes_per_pixel(job);
-    e.state_bytes_per_block = traits(job.sampling.method).most_block_bytes;
+    // Pixels of catchers have a memory of their own.
+    e.state_bytes_per_block =
+        traits(job.sampling.method).most_block_bytes * std::int64_t{has_catcher(job) ? 2 : 1};
     const auto bytes = [&](std::int64_t num_pixels, std::int64_t num_blocks) {
       return num_pixels * e.state_bytes_per_pixel + num_blocks * e.state_bytes_per_block;
     };

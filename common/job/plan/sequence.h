@@ -12,6 +12,7 @@
 #include "common/job/job_spec.h"
 #include "common/job/plan/timeline.h"
 #include "common/job/time.h"
+#include "common/math/pixel_blocks.h"
 #include "common/math/pixel_rect.h"
 
 namespace baton {
@@ -61,13 +62,15 @@ class TileGrid {
  public:
   static constexpr std::int32_t kAlign = limits::kAdaptiveBlock;
 
-  /// tile_size: a multiple of PixelBlocks::kSide, or one tile.
+  /// tile_size: > 0, rounded up to a multiple of PixelBlocks::kSide.
   TileGrid(const PixelRect& image, int tile_size);
   explicit TileGrid(const ImageSpec& image) : TileGrid(image.rendered(), image.tile_size) {}
 
   std::int32_t count() const { return columns_ * rows_; }
   std::int32_t columns() const { return columns_; }
   std::int32_t rows() const { return rows_; }
+  /// Side of a tile that no border clips.
+  std::int32_t tile_size() const { return tile_size_; }
   /// tile in [0, count()).
   PixelRect rect(std::int32_t tile) const;
   /// The tiles that have a pixel within `reach_px` of one of `tile`, in either direction;

@@ -58,8 +58,8 @@ double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
 /// Bytes of a pixel in a packed state after steps [0, end), on average.
 double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surface_share) {
   const JobEstimate e = estimate_job(job);
-  const auto whole = static_cast<double>(e.state_bytes) /
-                     static_cast<double>(job.image.rendered().area());
+  const auto whole =
+      static_cast<double>(e.state_bytes) / static_cast<double>(job.image.rendered().area());
   if (traits(job.sampling.method).carried != Carried::memory) {
     // Weights that are all alike pack to nothing.
     const double weights = weigh_alike(job) ? 4.0 * job.sampling.num_particles : 0;

@@ -10,7 +10,6 @@
 
 #include "common/base/limits.h"
 #include "common/job/text/job_fields.h"
-#include "common/math/pixel_blocks.h"
 
 namespace baton {
 namespace {
@@ -85,9 +84,7 @@ void fields(JobArchive& a, ImageSpec& image) {
   }
   max_sites_field(a, image);
   a.choice("filter", image.filter, kPixelFilters);
-  // Tiles consist of whole blocks; which pixels lie in which tile changes none of them.
-  if (a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize))
-    image.tile_size = (image.tile_size + PixelBlocks::kSide - 1) / PixelBlocks::kSide * PixelBlocks::kSide;
+  a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
   region_fields(a, image);
   overscan_fields(a, image);
   a.integer("siteSeed", image.site_seed);

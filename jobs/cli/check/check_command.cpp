@@ -201,9 +201,9 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
     fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);
   }
   if (e.state_bytes > 0) {
-    fmt::print("state      at most {:.0f} bytes a pixel\n",
-               static_cast<double>(e.state_bytes) /
-                   static_cast<double>(job.image.rendered().area()));
+    fmt::print(
+        "state      at most {:.0f} bytes a pixel\n",
+        static_cast<double>(e.state_bytes) / static_cast<double>(job.image.rendered().area()));
   }
   fmt::print("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
   const StoreEstimate store = estimate_store(job, surface_share(job, *assets.scene));

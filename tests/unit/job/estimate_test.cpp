@@ -37,8 +37,9 @@ TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
   job.sampling.method = Method::pool;
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 4);
   EXPECT_EQ(estimate_job(job).state_bytes_per_block, 1024 + 64);
-  EXPECT_EQ(estimate_job(job).state_bytes,
-            13 * 5000 + 1088 * static_cast<std::int64_t>(PixelBlocks(job.image.rendered()).count()));
+  EXPECT_EQ(
+      estimate_job(job).state_bytes,
+      13 * 5000 + 1088 * static_cast<std::int64_t>(PixelBlocks(job.image.rendered()).count()));
   job.sampling.method = Method::restir;
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16 + 2);
   for (const Method method : {Method::bidirectional, Method::ratio}) {
@@ -78,7 +79,7 @@ TEST(Estimate, CountsTheRaysOfAllRounds) {
   EXPECT_EQ(estimate_job(job).preroll_rounds, 0);
   job.sampling.method = Method::pool;
   EXPECT_EQ(estimate_job(job).primary_rays_per_pixel, 12);
-  EXPECT_EQ(estimate_job(job).preroll_rounds, 2);
+  EXPECT_EQ(estimate_job(job).preroll_rounds, 4);
   job.state.carry = false;
   EXPECT_EQ(estimate_job(job).preroll_rounds, 0);
 }

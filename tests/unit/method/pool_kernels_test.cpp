@@ -195,7 +195,9 @@ TEST_P(PoolRays, JudgeNoiseBesideTheLightThatTheyExpect) {
   const SiteBlock sites = pixel(true);
   const auto judged = [&](std::uint16_t share) {
     const float expected = (static_cast<float>(share) + 0.5f) / 4096;
-    const VisibilityTable memory{.everywhere = expected, .knows_rays = true};
+    VisibilityTable memory;
+    memory.everywhere = expected;
+    memory.knows_rays = true;
     const float lns =
         kernels::choose_pool_rays(tuning, {sites, view, presampled, counts(sites), rng.bits(0, 0)},
                                   0.5f, 16, memory, *scratch, *rays);

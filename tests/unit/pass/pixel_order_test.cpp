@@ -53,8 +53,11 @@ TEST(PixelOrder, KeepsBlocksTogether) {
         std::size_t last = blocks.count();
         for (const std::uint32_t slot : order.batch(i)) {
           const std::size_t block = blocks.of(pixels.index(slot));
-          if (block == last) ASSERT_GT(slot, before);
-          if (block != last) ASSERT_TRUE(here.insert(block).second) << seed;
+          if (block == last) {
+            ASSERT_GT(slot, before);
+          } else {
+            ASSERT_TRUE(here.insert(block).second) << seed;
+          }
           last = block;
           before = slot;
         }

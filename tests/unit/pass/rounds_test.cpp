@@ -140,8 +140,8 @@ TEST(Preroll, MakesTheFirstFrameLikeALaterOne) {
     }
     return sum;
   };
-  const double without = variance_of(1, 0), with = variance_of(1, 2), later = variance_of(5, 0);
-  std::printf("  variance of frame 1: %.3g, with two unseen rounds %.3g; of frame 5 %.3g\n",
+  const double without = variance_of(1, 0), with = variance_of(1, 4), later = variance_of(5, 0);
+  std::printf("  variance of frame 1: %.3g, with four unseen rounds %.3g; of frame 5 %.3g\n",
               without, with, later);
   EXPECT_LT(with, 0.8 * without);
   EXPECT_LT(with, 1.4 * later);

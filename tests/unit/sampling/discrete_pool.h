@@ -149,7 +149,7 @@ class PoolChain {
  private:
   /// Rays and candidates get fewer and more in this space.
   static constexpr PoolTuning kTuning{
-      .surroundings = 3, .usual_deviation = 0.05f, .light = {0.03f, 0.75f}};
+      .surroundings = 3, .control_from = 2, .usual_deviation = 0.05f, .light = {0.03f, 0.75f}};
 
   float uniform() { return rng_.uniforms(0, count_++)[0]; }
 

@@ -118,7 +118,7 @@ TEST(Pool, RaysGoWhereTheDeviationIs) {
   };
   EXPECT_EQ(rays(16, 0.025f, 1), 16);
   EXPECT_EQ(rays(16, 0.001f, 1), 8);
-  EXPECT_EQ(rays(16, 3, 60), 27);
+  EXPECT_EQ(rays(16, 3, 60), 32);
   EXPECT_EQ(rays(16, 30, 60), 64);
   EXPECT_EQ(rays(64, 0.5f, 1), 64);
   EXPECT_EQ(rays(1, 0.0f, 1), 1);

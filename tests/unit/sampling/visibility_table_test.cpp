@@ -16,8 +16,7 @@ const OctDirection kSide = encode_octahedral(normalize({1, 0.2f, 0}));
 TEST(VisibilityTable, EveryBinIsTheBinOfSomeDirection) {
   std::set<std::size_t> bins;
   for (std::uint32_t i = 0; i < 40000; ++i) {
-    for (const bool is_lamp : {false, true})
-      bins.insert(visibility_bin(i * 2654435761u, is_lamp));
+    for (const bool is_lamp : {false, true}) bins.insert(visibility_bin(i * 2654435761u, is_lamp));
   }
   EXPECT_EQ(bins.size(), BlockMemory::kCount);
   EXPECT_LT(*bins.rbegin(), BlockMemory::kCount);

@@ -81,6 +81,15 @@ TEST(SampleState, StoresOnlyBinsThatRaysReached) {
   EXPECT_EQ(raw_bytes(state, "BLKC"), 0u);
 }
 
+TEST(SampleState, RemembersRaysOfCatchersApart) {
+  SampleState state = remembering_state();
+  state.resize(memory_format(true), state.rect, 0);
+  state.source[1] = PixelSource::catcher;
+  memory_plane(state, true)[1].cells[9] = {7, 7};
+  memory_plane(state)[0].cells[8] = {3, 0};
+  EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
+}
+
 TEST(SampleState, RefusesCountsThatCannotBe) {
   for (const auto& [cell, said] : {std::pair(VisibilityCell{3, 4}, "4 of 3 rays are free"),
                                    std::pair(VisibilityCell{0, 0}, "0 of 0 rays are free")}) {
@@ -100,7 +109,7 @@ TEST(MemoryFormat, ABlockInheritsHalfOfTheMeanOfItsSources) {
   memory_plane(old)[1].cells[300] = {255, 1};
   SampleState now;
   now.resize(memory_format(), {0, 0, 4, 4}, 0);
-  const StateFormat::BlockSource sources[] = {{&old, 0, 3}, {&old, 1, 1}};
+  const StateFormat::BlockSource sources[] = {{&old, 0, false, 3}, {&old, 1, false, 1}};
   memory_format().inherit_block(sources, now, 0);
   EXPECT_EQ(memory_plane(now)[0].cells[7], (VisibilityCell{40, 25}));
   EXPECT_EQ(memory_plane(now)[0].cells[300], (VisibilityCell{31, 0}));

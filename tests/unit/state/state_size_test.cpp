@@ -68,12 +68,12 @@ Bytes claiming(std::int32_t width, std::int32_t height, bool with_memory) {
 // A file of a few kilobytes must not ask for hundreds of gigabytes.
 TEST(SampleState, AFileThatAsksForTooMuchIsRefusedBeforeAnythingIsAllocated) {
   for (const bool with_memory : {false, true}) {
-    const Bytes bytes = claiming(20000, with_memory ? 2000 : 32768, with_memory);
+    const Bytes bytes = claiming(20000, with_memory ? 3000 : 32768, with_memory);
     EXPECT_LT(bytes.size(), 100000u);
     const auto decoded = decode_state(bytes, "t.bst");
     ASSERT_FALSE(decoded.ok());
     EXPECT_THAT(decoded.error().message,
-                testing::HasSubstr(with_memory ? "t.bst: 40000000 pixels of 0 particles take"
+                testing::HasSubstr(with_memory ? "t.bst: 60000000 pixels of 0 particles take"
                                                : "t.bst: 655360000 pixels of 1 particles take"));
     EXPECT_THAT(decoded.error().message, testing::HasSubstr("past the limit of 4294967296"));
   }

@@ -43,18 +43,18 @@ kernels::CandidateCounts counts_for_noise(const PoolTuning& tuning, const SiteBl
 
 PixelMethod make_pool_method(const JobSpec& job, const PoolTuning& tuning) {
   const bool remembers = carries_state(job);
-  return {.format = remembers ? static_cast<const StateFormat*>(&memory_format())
+  return {.format = remembers ? static_cast<const StateFormat*>(&memory_format(has_catcher(job)))
                               : static_cast<const StateFormat*>(&sample_format()),
           .start = [spec = job.sampling, remembers, tuning] {
             return std::make_unique<PoolSampler>(spec, remembers, tuning);
           }};
 }
 
-const VisibilityTable& PoolSampler::table_of(const PixelState& pixel) {
-  const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
-  if (!has_table_ || block != block_) {
-    table_.read(memory_plane(pixel.tile)[block], tuning_.prior_rays);
-    block_ = block;
+const VisibilityTable& PoolSampler::table_of(const PixelState& pixel, bool sees_catcher) {
+  const std::pair wanted(PixelBlocks(pixel.tile.rect).of(pixel.index), sees_catcher);
+  if (!has_table_ || wanted != table_is_of_) {
+    table_.read(memory_plane(pixel.tile, sees_catcher)[wanted.first], tuning_.prior_rays);
+    table_is_of_ = wanted;
     has_table_ = true;
   }
   return table_;
@@ -66,7 +66,7 @@ void PoolSampler::look_ahead(const RoundLight& /*light*/, bool /*has_history*/,
                              const PixelState& pixel) {
   if (!remembers_) return;
   const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
-  if (has_table_ && block == block_) return;
+  if (has_table_ && block == table_is_of_.first) return;
   const auto* const bytes =
       reinterpret_cast<const std::byte*>(&std::as_const(memory_plane(pixel.tile)[block]));
   for (std::size_t at = 0; at < sizeof(BlockMemory); at += 64) __builtin_prefetch(bytes + at);
@@ -78,7 +78,9 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, const PixelState& 
   poison(scratch_);
   poison(rays_);
   PixelNoise* const own = remembers_ ? &noise_plane(pixel.tile)[pixel.index] : nullptr;
-  const VisibilityTable& memory = remembers_ ? table_of(pixel) : kNothing;
+  const auto seen = std::ranges::find_if(input.hits, &SurfaceHit::hit);
+  const bool sees_catcher = seen != input.hits.end() && seen->is_catcher;
+  const VisibilityTable& memory = remembers_ ? table_of(pixel, sees_catcher) : kNothing;
   const kernels::CandidateCounts counts =
       counts_for_noise(tuning_, input.sites, num_candidates_, lobe_fraction_,
                        light_variance(own != nullptr ? *own : PixelNoise{}));
@@ -95,7 +97,8 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, const PixelState& 
 void PoolSampler::learn(const FoundRays& found, const PixelState& pixel) {
   if (!remembers_) return;
   const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
-  remember_rays(memory_plane(pixel.tile)[block], found.tag, found.is_free);
+  const bool sees_catcher = pixel.tile.latest_source(pixel.index) == PixelSource::catcher;
+  remember_rays(memory_plane(pixel.tile, sees_catcher)[block], found.tag, found.is_free);
 }
 
 }  // namespace baton

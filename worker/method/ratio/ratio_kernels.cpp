@@ -22,8 +22,7 @@ struct ColorLine {
   Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< sum of w (f cos L) / p~
 
   template <class AddColor>
-  HWY_INLINE void Add(VU /*code*/, VF /*inverse_density*/, VF weight,
-                      const AddColor& add_color) {
+  HWY_INLINE void Add(VU /*code*/, VF /*inverse_density*/, VF weight, const AddColor& add_color) {
     end.Add(weight);
     add_color(hn::Set(DF(), 1.0f), colors);
   }
