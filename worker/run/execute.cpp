@@ -49,7 +49,7 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
     }
     StatePtr state = loaded.states->find(input);
     if (state == nullptr && input.is_held())
-      return Error{ErrorKind::io, fmt::format("{}: is not held here", blob_name(input))};
+      return Error{ErrorKind::corrupt, fmt::format("{}: is not held here", blob_name(input))};
     if (state == nullptr) {
       BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
       BATON_ASSIGN(SampleState decoded,
