@@ -19,6 +19,7 @@ NUM_WORKERS = 3
 SUPERSEDED_S = 8 * PATIENCE  # so long after a worker fell silent its leases are another's, if there are any
 SUPERSEDER_STOPS_S = 0.5
 FOREIGN_S = 3 * PATIENCE  # a worker that is not refused in this time is not
+STRIKE_S = 240 * PATIENCE  # what does not strike in this time never will
 RECENT_LINES = 3000  # of the record: who has which lease
 
 # That may be lost, come twice or late.
@@ -49,6 +50,7 @@ class Chaos(FrameFaults):
 
     def strike(self):
         """One fault that really struck."""
+        deadline = time.monotonic() + STRIKE_S
         while True:
             if not self.deck:
                 self.deck = self.rng.sample(self.faults, len(self.faults))
@@ -56,6 +58,8 @@ class Chaos(FrameFaults):
             if fault():
                 return
             self.deck.insert(self.rng.randrange(len(self.deck) + 1), fault)
+            check(time.monotonic() < deadline,
+                  f"nothing has struck for {STRIKE_S} s, not even {', '.join(card.__name__ for card in self.deck)}")
             time.sleep(0.02)
             self.tend()
             self.renew()
