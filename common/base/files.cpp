@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -52,8 +53,9 @@ std::string lower_extension(const fs::path& path) {
 }
 
 Status expect_file(const fs::path& path) {
-  std::error_code error;
-  if (fs::exists(path, error)) return {};
+  struct stat status {};
+  if (::stat(path.c_str(), &status) == 0) return {};
+  if (errno != ENOENT && errno != ENOTDIR) return io_error("cannot look at it", path);
   return Error{ErrorKind::bad_input, fmt::format("{}: no such file", path.string())};
 }
 
@@ -65,16 +67,16 @@ Result<Content> read_whole(const fs::path& path, std::uint64_t max_size_bytes) {
   // O_NONBLOCK: a named pipe must not make us wait for its writer.
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!file) return io_error("cannot open", path);
-  std::error_code error;
-  if (fs::is_directory(path, error)) {
+  struct stat status {};
+  if (::fstat(file.number(), &status) != 0) return io_error("cannot look at it", path);
+  if (S_ISDIR(status.st_mode)) {
     return Error{ErrorKind::bad_input,
                  fmt::format("{}: is a folder, expected a file", path.string())};
   }
-  if (!fs::is_regular_file(path, error)) {
+  if (!S_ISREG(status.st_mode)) {
     return Error{ErrorKind::bad_input, fmt::format("{}: is no plain file", path.string())};
   }
-  const std::uint64_t size = fs::file_size(path, error);
-  if (error) return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), error.message())};
+  const auto size = static_cast<std::uint64_t>(status.st_size);
   if (size > max_size_bytes) {
     return Error{ErrorKind::bad_input, fmt::format("{}: {} bytes, at most {} are read",
                                                    path.string(), size, max_size_bytes)};

@@ -22,6 +22,7 @@
 #include <limits>
 #include <optional>
 
+#include "common/base/file_stamp.h"
 #include "common/base/limits.h"
 #include "common/image/exr_channels.h"
 #include "common/image/exr_header.h"
@@ -155,10 +156,9 @@ void read_planes(Imf::InputFile& file, FilmTile& image) {
 template <class File = Imf::InputFile, class Use>
 auto with_exr_file(const std::filesystem::path& path, Use use)
     -> decltype(use(std::declval<File&>())) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    return Error{ErrorKind::io, fmt::format("{}: no such file", path.string())};
-  }
+  const Result<std::optional<FileStamp>> stamp = stamp_of(path);
+  if (!stamp) return stamp.error();
+  if (!*stamp) return Error{ErrorKind::io, fmt::format("{}: no such file", path.string())};
   if (const Status sound = check_exr_attributes(path); !sound) return sound.error();
   try {
     File file(path.c_str(), kOpenExrThreads);

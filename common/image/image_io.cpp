@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "common/base/file_stamp.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/image/exr_image.h"
@@ -20,10 +21,8 @@ enum class ImageFormat { exr, radiance, unknown };
 
 /// By the first bytes, not by the name.
 Result<ImageFormat> image_format(const std::filesystem::path& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    return Error{ErrorKind::io, fmt::format("{}: no such file", path.string())};
-  }
+  BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
+  if (!stamp) return Error{ErrorKind::io, fmt::format("{}: no such file", path.string())};
   std::ifstream file(path, std::ios::binary);
   std::array<char, 4> start{};
   file.read(start.data(), start.size());

@@ -35,9 +35,11 @@ enum class FarmEventKind : std::uint8_t {
   worker_left = 18,
   worker_lost = 19,  ///< silent for too long
   worker_drained = 20,
+  frames_locked = 21,
+  frames_unlocked = 22,
 };
-constexpr FarmEventKind last_of(FarmEventKind) { return FarmEventKind::worker_drained; }
-/// "coordinator started" ... "worker drained".
+constexpr FarmEventKind last_of(FarmEventKind) { return FarmEventKind::frames_unlocked; }
+/// "coordinator started" ... "frames unlocked".
 std::string_view farm_event_name(FarmEventKind kind);
 
 /// A task as people see it: which frames, which tile.

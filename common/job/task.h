@@ -65,6 +65,9 @@ struct BlobRef {
   /// A state without bytes in the store: it is in the memory of the worker that made it, where
   /// `digest` names it (held_state_name).
   bool is_held() const { return kind == BlobKind::state && size_bytes == 0; }
+  /// An image that counts as made whatever its bytes are: that of a locked frame.
+  static BlobRef any_image(FrameIndex frame) { return {BlobKind::image, frame.value(), 0, {}, 0}; }
+  bool is_any_image() const { return kind == BlobKind::image && digest == Digest(); }
   /// The frame of an image.
   FrameIndex frame() const;
   /// The step of a state, a film or first-pass samples.
@@ -169,8 +172,10 @@ struct FrameQuality {
   /// FrameNoise::relative() (common/image/noise.h).
   float noise = 0;
   float noise_error = 0;  ///< standard error of `noise`, as a share
-  float mean = 0;         ///< radiance, over pixels and the three
-  float lowest = 0;       ///< the least value, at most 0
+  /// In the measure of quality.noiseThreshold (common/image/noise.h); 0: not told.
+  float cycles_noise = 0;
+  float mean = 0;    ///< radiance, over pixels and the three
+  float lowest = 0;  ///< the least value, at most 0
   /// What lies below zero over all light, [0, ...).
   float light_below_zero = 0;
   bool clamped = false;  ///< what lay below zero was set to 0

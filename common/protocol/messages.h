@@ -19,7 +19,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 12;
+inline constexpr std::uint16_t kProtocolVersion = 13;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.
@@ -106,6 +106,7 @@ struct JobDocument {
   std::string json;  ///< resolved: absolute paths, asset digests
   /// Stands in its output folder (output_token_file); empty: that could not be marked.
   std::string token = {};
+  JobId id = {};  ///< of which job it is a version
 };
 /// Finish what is in work, take nothing new, end.
 struct Drain {};
@@ -140,6 +141,12 @@ struct DeleteJob {
   std::string job;
 };
 struct StopCoordinator {};
+/// Frames of a job count as done from now on, whatever is in their files; off: no longer.
+struct LockFrames {
+  std::string job;
+  std::vector<FrameNumber> frames;  ///< ascending
+  bool off = false;
+};
 /// What has happened. job: as of ShowJob; empty: of all.
 struct ListEvents {
   std::string job;
@@ -213,9 +220,18 @@ struct ShownJob {
   JobDetail detail;
   /// Workers are connected, and all of them render otherwise than what is done was rendered.
   bool lacks_renderer = false;
+  /// After each number of sweeps since its submission: the noise, and how many more there are.
+  std::vector<std::string> growth = {};
+};
+/// Events of a kind that are forgotten.
+struct ForgottenEvents {
+  FarmEventKind kind = FarmEventKind::coordinator_started;
+  std::int64_t count = 0;
+  double seconds = 0;  ///< all together
 };
 struct EventList {
   std::vector<FarmEvent> events;
+  std::vector<ForgottenEvents> forgotten = {};  ///< of the job that was asked for
 };
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind
@@ -229,7 +245,7 @@ using Message =
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
                  JobAccepted, JobList, ShownJob, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
                  ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates, BlobsLeft,
-                 ListEvents, EventList>;
+                 ListEvents, EventList, LockFrames>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/base/file_stamp.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/scene/gltf/meshes.h"
@@ -39,12 +40,9 @@ Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals
 
 Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, bool with_uvs) {
   // Look at the file before any reader does.
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) return bad_mesh(path, "missing: expected a mesh file");
-  if (!std::filesystem::is_regular_file(status))
-    return bad_mesh(path, "expected a mesh file, found no regular file");
-  if (std::filesystem::file_size(path, error) > limits::kMaxAssetFileBytes) {
+  BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
+  if (!stamp) return bad_mesh(path, "missing: expected a mesh file");
+  if (stamp->size_bytes > limits::kMaxAssetFileBytes) {
     return bad_mesh(path, "larger than " + std::to_string(limits::kMaxAssetFileBytes) + " bytes");
   }
 

@@ -301,6 +301,8 @@ Status Journal::delete_job(const Digest& job) {
         "DELETE FROM versions WHERE document = ?", "DELETE FROM renderers WHERE job = ?",
         "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
+  BATON_TRY(change("DELETE FROM growth WHERE id NOT IN (SELECT id FROM versions)"));
+  BATON_TRY(change("DELETE FROM locked_frames WHERE id NOT IN (SELECT id FROM versions)"));
   return change("DELETE FROM identities WHERE id NOT IN (SELECT id FROM versions)");
 }
 

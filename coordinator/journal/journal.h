@@ -49,6 +49,14 @@ struct EventSum {
   double seconds = 0;
 };
 
+/// A job whose quality lets it grow, since it was submitted last.
+struct JobGrowth {
+  std::int64_t since_ms = 0;      ///< since 1970, UTC
+  std::int32_t first_sweeps = 0;  ///< that it had then; 0: none
+  /// What was decided after each number of sweeps, lines.
+  std::vector<std::string> said = {};
+};
+
 /// By what a job is found.
 struct JobIndex {
   std::string name;
@@ -158,6 +166,12 @@ class Journal {
   /// number.
   Result<std::int32_t> record_version(const Digest& document, const JobId& id);
   Status record_times(const JobId& id, const JobTimes& times);
+  /// Frames that count as done whatever is in their files.
+  Result<std::map<JobId, std::set<FrameNumber>>> locked_frames();
+  Status record_lock(const JobId& id, FrameNumber frame, bool is_locked);
+  /// An empty one: the job does not grow.
+  Result<JobGrowth> growth(const JobId& id);
+  Status record_growth(const JobId& id, const JobGrowth& growth);
   /// Appends an event; its sequence number is given here.
   Status record_event(const FarmEvent& event);
   /// In the order of time.

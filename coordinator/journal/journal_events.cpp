@@ -1,4 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <sstream>
 
 #include "coordinator/journal/journal.h"
 
@@ -47,6 +50,42 @@ Result<std::int32_t> Journal::record_version(const Digest& document, const JobId
 Status Journal::record_times(const JobId& id, const JobTimes& times) {
   return change("UPDATE identities SET submitted_ms = ?, started_ms = ?, ended_ms = ? WHERE id = ?",
                 times.submitted_ms, times.started_ms, times.ended_ms, id.hex());
+}
+
+Result<std::map<JobId, std::set<FrameNumber>>> Journal::locked_frames() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT id, frame FROM locked_frames"));
+  std::map<JobId, std::set<FrameNumber>> locked;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return locked;
+    if (const std::optional<JobId> id = JobId::from_hex(query.text(0)))
+      locked[*id].insert(FrameNumber(static_cast<std::int32_t>(query.integer(1))));
+  }
+}
+
+Status Journal::record_lock(const JobId& id, FrameNumber frame, bool is_locked) {
+  return change(is_locked ? "INSERT OR IGNORE INTO locked_frames (id, frame) VALUES (?, ?)"
+                          : "DELETE FROM locked_frames WHERE id = ? AND frame = ?",
+                id.hex(), std::int64_t{frame.value()});
+}
+
+Result<JobGrowth> Journal::growth(const JobId& id) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT since_ms, sweeps, said FROM growth WHERE id = ?"));
+  BATON_ASSIGN(const bool row, query.bind(id.hex()).step());
+  JobGrowth growth;
+  if (!row) return growth;
+  growth.since_ms = query.integer(0);
+  growth.first_sweeps = static_cast<std::int32_t>(query.integer(1));
+  std::istringstream lines(query.text(2));
+  for (std::string line; std::getline(lines, line);) growth.said.push_back(std::move(line));
+  return growth;
+}
+
+Status Journal::record_growth(const JobId& id, const JobGrowth& growth) {
+  return change("INSERT OR REPLACE INTO growth (id, since_ms, sweeps, said) VALUES (?, ?, ?, ?)",
+                id.hex(), growth.since_ms, std::int64_t{growth.first_sweeps},
+                fmt::format("{}", fmt::join(growth.said, "\n")));
 }
 
 Status Journal::record_event(const FarmEvent& event) {

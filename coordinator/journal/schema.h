@@ -5,7 +5,7 @@
 namespace baton {
 
 /// Stands in `PRAGMA user_version`.
-inline constexpr std::int64_t kSchemaVersion = 6;
+inline constexpr std::int64_t kSchemaVersion = 7;
 inline constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
@@ -74,8 +74,10 @@ inline constexpr const char* kSchema = R"sql(
 /// `output_marks` of which open jobs the output folder is marked; store_token has one row, or none.
 /// `renderers`: by what the tasks of a job were done that are done.
 /// Where other tables say `job`, they mean the digest of a document: a version. `versions` says of
-/// which job (JobId) it is the n-th, `identities` when what happened to that job. `events` is
-/// appended to alone (FarmEvent), without an index, which would cost more than it saves; its last
+/// which job (JobId) it is the n-th, `identities` when what happened to that job, `locked_frames`
+/// which of its frames count as done whatever is in their files, `growth` how it has come by its
+/// sweeps. `events` is appended to alone
+/// (FarmEvent), without an index, which would cost more than it saves; its last
 /// row stays, so that no number is given twice. Of those that are old, `event_sums` keeps count and
 /// seconds.
 inline constexpr const char* kLaterTables = R"sql(
@@ -100,6 +102,11 @@ inline constexpr const char* kLaterTables = R"sql(
   CREATE TABLE IF NOT EXISTS event_sums (
     job TEXT NOT NULL, kind INTEGER NOT NULL, count INTEGER NOT NULL, seconds REAL NOT NULL,
     PRIMARY KEY (job, kind)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS locked_frames (
+    id TEXT NOT NULL, frame INTEGER NOT NULL, PRIMARY KEY (id, frame)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS growth (
+    id TEXT PRIMARY KEY, since_ms INTEGER NOT NULL, sweeps INTEGER NOT NULL,
+    said TEXT NOT NULL) WITHOUT ROWID;
 )sql";
 
 /// Jobs of a journal that knew no identities go by the beginning of their digest.

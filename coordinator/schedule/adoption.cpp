@@ -49,7 +49,7 @@ class KeptFrames {
 
       // The same pixels: is the file as it was written?
       BlobRef image = task.outputs.front();
-      const bool is_there = files_.has_frame(frame, image);
+      const bool is_there = files_.locked.contains(frame) || files_.has_frame(frame, image);
       image.position = frame.value();
       if (is_there) images_[frame.index()] = image;
       if (!is_there) lost_.insert(frame);
@@ -60,6 +60,13 @@ class KeptFrames {
                           std::find(others.begin(), others.end(), frame) == others.end();
       if (!is_own) others_.insert(frame);
       if (is_own && is_there) others_.erase(frame);
+    }
+  }
+
+  /// After all former jobs: what none of them has recorded of a locked frame needs no record.
+  void add_locked() {
+    for (const FrameIndex frame : files_.locked) {
+      if (!has(frame)) images_[frame.index()] = BlobRef::any_image(frame);
     }
   }
 
@@ -287,6 +294,7 @@ Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& fo
     kept.collect(former, comparison);
     predecessors.emplace_back(wanted, former, comparison);
   }
+  kept.add_locked();
   kept.write_to(adoption);
 
   // The one that has come farthest: with all its states, then with single tasks.

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "common/job/text/picture.h"
@@ -23,6 +24,8 @@ struct KeptFiles {
   /// Whether the file of this frame of the new job has this size and digest.
   std::function<bool(FrameIndex frame, const BlobRef& image)> has_frame;
   std::function<bool(const BlobRef& blob)> has_blob;
+  /// Frames of the new job that count as written, whatever is in their files.
+  std::set<FrameIndex> locked = {};
 };
 
 /// What a new job need not do.

@@ -121,6 +121,11 @@ struct FramesInspected {
   /// For people: frames that are others' now, which stay as they are; empty: none is.
   std::string strange = {};
 };
+/// Frames that count as done from now on, whatever is in their files; none of them is leased.
+struct FramesLocked {
+  Digest job;
+  std::vector<FrameIndex> frames;
+};
 /// A job that has ended is forgotten; nobody here needs its blobs any more.
 struct JobForgotten {
   Digest job;
@@ -199,9 +204,9 @@ struct ClockTicked {};
 
 using Event =
     std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, FramesInspected,
-                 JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
-                 AttemptFailed, ResultMissing, SpaceLacking, InputsLost, LeaseReturned,
-                 HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
+                 FramesLocked, JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested,
+                 TaskCompleted, AttemptFailed, ResultMissing, SpaceLacking, InputsLost,
+                 LeaseReturned, HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed

@@ -53,7 +53,8 @@ void OutputBook::publish_state(const JobGraph& graph, TaskIndex task, const Blob
 void OutputBook::remove(const JobGraph& graph, TaskIndex task, bool remember) {
   std::vector<BlobRef> before = std::exchange(record(task).outputs, {});
   for (const BlobRef& output : before) count(graph, output, false);
-  if (remember && !before.empty()) former_[task] = std::move(before);
+  if (remember && !before.empty() && !before.front().is_any_image())
+    former_[task] = std::move(before);
 }
 
 }  // namespace baton

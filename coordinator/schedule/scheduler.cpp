@@ -141,6 +141,22 @@ void Scheduler::on(const FramesInspected& event, TimePoint, Actions& actions) {
   }
 }
 
+void Scheduler::on(const FramesLocked& event, TimePoint, Actions& actions) {
+  Job* job = find(event.job);
+  if (!job || !is_open(job->status)) return;
+  for (const FrameIndex frame : event.frames) {
+    const std::optional<TaskIndex> task = job->tasks.graph().find(assemble_task(frame));
+    if (!task) continue;
+    const TaskStatus status = job->tasks.book().status(*task);
+    if (status != TaskStatus::blocked && status != TaskStatus::ready) continue;
+    Completion completion{assemble_task(frame), {{BlobRef::any_image(frame)}}};
+    job->tasks.complete(*task, completion, job->tasks.made().stranger(), /*is_shared=*/true,
+                        blobs_);
+    actions.push_back(RecordCompletion{event.job, std::move(completion)});
+  }
+  end_if_finished(event.job, *job, actions);
+}
+
 void Scheduler::on(const JobForgotten& event, TimePoint, Actions&) {
   Job* job = find(event.job);
   if (!job || is_open(job->status)) return;

@@ -118,6 +118,7 @@ class Scheduler {
   void on(const JobPaused& event, TimePoint now, Actions& actions);
   void on(const JobResumed& event, TimePoint now, Actions& actions);
   void on(const FramesInspected& event, TimePoint now, Actions& actions);
+  void on(const FramesLocked& event, TimePoint now, Actions& actions);
   void on(const JobForgotten& event, TimePoint now, Actions& actions);
   void on(const WorkerJoined& event, TimePoint now, Actions& actions);
   void on(const WorkerAlive& event, TimePoint now, Actions& actions);

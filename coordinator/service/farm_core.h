@@ -15,6 +15,7 @@
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/service/file_reader.h"
 #include "coordinator/service/history.h"
+#include "coordinator/service/locked_frames.h"
 #include "coordinator/service/peers.h"
 
 namespace baton {
@@ -65,6 +66,10 @@ class FarmCore {
   /// Jobs whose frames are to be compared with the record, and when.
   std::map<Digest, TimePoint> to_inspect;
 
+  /// Frames of a version that count as done.
+  LockedFrames locked(const Digest& version, const JobSpec& spec) const {
+    return {spec, history.jobs().of(version).locked};
+  }
   /// Something happens; what follows is journalled, sent or noted for the end of the turn.
   Status step(const Event& event);
   /// Sends what waited for the commit, and removes blobs that nobody needs.

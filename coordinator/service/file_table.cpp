@@ -9,6 +9,12 @@ Result<Digest> digest_of_file(const std::filesystem::path& path) {
   return digest_of(bytes);
 }
 
+FileVerdict judge_locked(const std::filesystem::path& path) {
+  const Result<std::optional<FileStamp>> stamp = stamp_of(path);
+  if (!stamp) return {FileState::unreadable, stamp.error().message};
+  return {*stamp ? FileState::right : FileState::absent};
+}
+
 FileVerdict judge_content(const FileContent* content, const BlobRef& recorded) {
   if (content == nullptr) return {FileState::unknown};
   if (!content->fault.empty()) return {FileState::unreadable, content->fault};

@@ -47,6 +47,8 @@ struct FileVerdict {
 
 /// Reads all of a file. Errors: those of read_file.
 Result<Digest> digest_of_file(const std::filesystem::path& path);
+/// How the file of a locked frame stands, whatever is in it: right, absent or unreadable.
+FileVerdict judge_locked(const std::filesystem::path& path);
 /// What was read, beside what was recorded; nullptr: nothing was.
 FileVerdict judge_content(const FileContent* content, const BlobRef& recorded);
 

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 #include <span>
 
 #include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
 
 namespace baton {
@@ -31,17 +31,12 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& fol
   return record;
 }
 
-std::map<fs::path, std::vector<BlobRef>> FolderRecord::frames_of(const JobSpec& job) const {
-  std::map<fs::path, std::vector<BlobRef>> frames;
-  for (std::size_t i = 0; i < job.frames.size(); ++i) {
-    const fs::path path =
-        frame_path(job, FrameIndex(static_cast<std::int32_t>(i))).lexically_normal();
-    std::vector<BlobRef>& recorded = frames[path];
-    const auto found = images_.find(path);
-    if (found == images_.end()) continue;
-    for (const Image& image : found->second) recorded.push_back(image.image);
-  }
-  return frames;
+std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
+  std::vector<BlobRef> recorded;
+  const auto found = images_.find(path.lexically_normal());
+  if (found == images_.end()) return recorded;
+  for (const Image& image : found->second) recorded.push_back(image.image);
+  return recorded;
 }
 
 bool FolderRecord::has_written(const fs::path& path, const FileVerdict& picture) const {
@@ -58,11 +53,21 @@ bool FolderRecord::has_written(const fs::path& path, const FileVerdict& picture)
 }
 
 OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const Digest& job,
-                          const JobSpec& spec) {
+                          const JobSpec& spec, const LockedFrames& locked) {
   OddFrames odd;
   BlobRef nothing;
   nothing.kind = BlobKind::image;
-  for (const auto& [path, images] : record.frames_of(spec)) {
+  for (FrameIndex frame; frame.index() < spec.frames.size(); ++frame) {
+    const fs::path path = frame_path(spec, frame).lexically_normal();
+    const FrameNumber number = spec.frames[frame.index()];
+    if (locked.contains(frame)) {
+      const FileVerdict verdict = judge_locked(path);
+      if (verdict.state == FileState::absent)
+        odd.doubt.locked_absent.push_back({path.string(), number});
+      if (verdict.state == FileState::unreadable) odd.unreadable = verdict.fault;
+      continue;
+    }
+    const std::vector<BlobRef> images = record.images_of(path);
     FileVerdict verdict = files.judge(path, images.empty() ? nothing : images.front());
     for (const BlobRef& image : images) {
       if (verdict.state != FileState::right && files.is_right(path, image))
@@ -77,22 +82,52 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
       odd.unreadable = verdict.fault;
     } else if (verdict.state == FileState::strange && verdict.writer != job.hex() &&
                !record.has_written(path, verdict)) {
-      odd.strange.push_back(path.string());
+      odd.doubt.strange.push_back({path.string(), number});
     }
   }
   return odd;
 }
 
-std::string strange_text(const std::vector<std::string>& strange) {
-  if (strange.empty()) return {};
+namespace {
+
+/// "A, B and 3 more".
+std::string files_text(const std::vector<FramesInDoubt::Frame>& frames) {
   constexpr std::size_t kMost = 8;
-  const auto shown = std::span(strange).first(std::min(kMost, strange.size()));
-  const std::size_t more = strange.size() - shown.size();
-  return fmt::format(
-      "{}{} {} not what a job has written here: another picture, changed or replaced, which is "
-      "kept; --restart renders {} again",
-      fmt::join(shown, ", "), more > 0 ? fmt::format(" and {} more", more) : "",
-      strange.size() == 1 ? "is" : "are", strange.size() == 1 ? "it" : "them");
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, frames.size()); ++i)
+    text += (i > 0 ? ", " : "") + frames[i].file;
+  return text + (frames.size() > kMost ? fmt::format(" and {} more", frames.size() - kMost) : "");
+}
+
+std::string numbers_text(const std::vector<FramesInDoubt::Frame>& frames) {
+  std::vector<FrameNumber> numbers;
+  for (const FramesInDoubt::Frame& frame : frames) numbers.push_back(frame.number);
+  return format_frames(numbers);
+}
+
+}  // namespace
+
+std::string doubt_text(const FramesInDoubt& doubt, const JobId& job) {
+  std::string text;
+  if (const auto& frames = doubt.strange; !frames.empty()) {
+    const bool is_one = frames.size() == 1;
+    text = fmt::format(
+        "{} {} not what a job has written here: another picture, changed or replaced, which is "
+        "kept; --restart renders {} again",
+        files_text(frames), is_one ? "is" : "are", is_one ? "it" : "them");
+    if (!job.empty())
+      text += fmt::format(", `baton job lock {} --frames {}` keeps {} for good", job.short_hex(),
+                          numbers_text(frames), is_one ? "it" : "them");
+  }
+  if (const auto& frames = doubt.locked_absent; !frames.empty()) {
+    const bool is_one = frames.size() == 1;
+    text += fmt::format(
+        "{}{} {} locked and not there: put {} back, or have {} rendered with `baton job lock {} "
+        "--off --frames {}`",
+        text.empty() ? "" : "; ", files_text(frames), is_one ? "is" : "are", is_one ? "it" : "them",
+        is_one ? "it" : "them", job.short_hex(), numbers_text(frames));
+  }
+  return text;
 }
 
 }  // namespace baton

@@ -5,10 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "common/job/job_id.h"
 #include "common/job/job_spec.h"
 #include "coordinator/journal/journal.h"
 #include "coordinator/service/file_reader.h"
 #include "coordinator/service/file_table.h"
+#include "coordinator/service/locked_frames.h"
 
 namespace baton {
 
@@ -18,9 +20,8 @@ class FolderRecord {
   /// folder: folder_of() a job.
   static Result<FolderRecord> read(Journal& journal, const std::string& folder);
 
-  /// The frames of a job by the path of their file, each with what it may be as far as it is
-  /// recorded.
-  std::map<std::filesystem::path, std::vector<BlobRef>> frames_of(const JobSpec& job) const;
+  /// What the file of a frame may be, as far as it is recorded.
+  std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
   /// Whether a picture in the place of a frame is a job's of this folder: one that is recorded, or
   /// one that was written and never reported.
   bool has_written(const std::filesystem::path& path, const FileVerdict& picture) const;
@@ -34,17 +35,30 @@ class FolderRecord {
   std::vector<Digest> jobs_;
 };
 
+/// Frames of which only a person can say what becomes of them.
+struct FramesInDoubt {
+  struct Frame {
+    std::string file;
+    FrameNumber number{};
+  };
+  std::vector<Frame> strange;        ///< files that are pictures of nobody here
+  std::vector<Frame> locked_absent;  ///< locked, and not there
+
+  bool empty() const { return strange.empty() && locked_absent.empty(); }
+};
+/// For people: which they are, and the ways on. job: whose frames they are; empty: it is new, and
+/// nothing of it can be locked.
+std::string doubt_text(const FramesInDoubt& doubt, const JobId& job);
+
 /// The files in the places of a job's frames that are not what its folder's jobs have recorded.
 struct OddFrames {
-  std::vector<FileToRead> unread;    ///< only their bytes can tell
-  std::vector<std::string> strange;  ///< files that are pictures of nobody here
+  std::vector<FileToRead> unread;  ///< only their bytes can tell
+  FramesInDoubt doubt;
   /// Why one of them cannot be read; empty: none is.
   std::string unreadable;
 };
 /// job: the digest of the document of `spec`; what its header names may be written again.
 OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const Digest& job,
-                          const JobSpec& spec);
-/// For people: that these are others' frames now; empty: there are none.
-std::string strange_text(const std::vector<std::string>& strange);
+                          const JobSpec& spec, const LockedFrames& locked);
 
 }  // namespace baton

@@ -29,26 +29,39 @@ bool is_as_read(const FileContent& content) {
 
 }  // namespace
 
-std::vector<FileToRead> files_to_inspect(const Scheduler::Job& job, const FileTable& files) {
+std::vector<FileToRead> files_to_inspect(const Scheduler::Job& job, const FileTable& files,
+                                         const LockedFrames& locked) {
   std::vector<FileToRead> wanted;
-  for_each_finished_frame(job, [&](TaskIndex, const fs::path& path, const BlobRef& recorded) {
+  for_each_finished_frame(job, [&](TaskIndex task, const fs::path& path, const BlobRef& recorded) {
+    if (locked.contains(FrameIndex(task))) return;
     wanted.push_back({path, {recorded.digest}, files.stamp_with(path, recorded.digest)});
   });
   return wanted;
 }
 
 Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
-                                       const std::vector<FileContent>& contents, Journal& journal) {
+                                       const std::vector<FileContent>& contents,
+                                       const LockedFrames& locked, Journal& journal) {
   std::map<fs::path, const FileContent*> read;
   for (const FileContent& content : contents) read[content.path] = &content;
 
   InspectedFrames found;
+  const auto number_of = [&](TaskIndex task) {
+    return job.spec.frames[static_cast<std::size_t>(task)];
+  };
   std::map<fs::path, std::pair<TaskIndex, FileVerdict>> pictures;
   const auto lose = [&](TaskIndex task, const fs::path& path) {
     found.lost.push_back(job.tasks.graph().key(task));
     found.lost_files.push_back(path.string());
   };
   for_each_finished_frame(job, [&](TaskIndex task, const fs::path& path, const BlobRef& recorded) {
+    if (locked.contains(FrameIndex(task))) {
+      const FileVerdict verdict = judge_locked(path);
+      if (verdict.state == FileState::absent)
+        found.doubt.locked_absent.push_back({path.string(), number_of(task)});
+      if (verdict.state == FileState::unreadable) found.unreadable = verdict.fault;
+      return;
+    }
     const auto content = read.find(path);
     const FileVerdict verdict =
         judge_content(content == read.end() ? nullptr : content->second, recorded);
@@ -71,7 +84,7 @@ Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
     if (record.has_written(path, picture.second)) {
       lose(picture.first, path);
     } else {
-      found.strange.push_back(path.string());
+      found.doubt.strange.push_back({path.string(), number_of(picture.first)});
     }
   }
   return found;

@@ -12,25 +12,27 @@ namespace baton {
 /// Before a job is done, its frames are compared with what was recorded at their reports: size,
 /// inode and time, the bytes where these differ.
 
-/// The files of all finished frames.
-std::vector<FileToRead> files_to_inspect(const Scheduler::Job& job, const FileTable& files);
+/// The files of all finished frames that are not locked.
+std::vector<FileToRead> files_to_inspect(const Scheduler::Job& job, const FileTable& files,
+                                         const LockedFrames& locked);
 
 /// How the finished frames of a job stand.
 struct InspectedFrames {
   std::vector<TaskKey> lost;            ///< gone or damaged
   std::vector<std::string> lost_files;  ///< theirs, in that order
-  std::vector<std::string> strange;     ///< files that are pictures of nobody here
+  FramesInDoubt doubt;
   /// Why one of them cannot be read; empty: none is.
   std::string unreadable;
   /// Whether a frame has changed since it was read, or was not among those that were.
   bool is_stale = false;
 
   bool all_right() const {
-    return lost.empty() && strange.empty() && unreadable.empty() && !is_stale;
+    return lost.empty() && doubt.empty() && unreadable.empty() && !is_stale;
   }
 };
 /// contents: of files_to_inspect(), maybe of an earlier day of the job. Errors: the journal's.
 Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
-                                       const std::vector<FileContent>& contents, Journal& journal);
+                                       const std::vector<FileContent>& contents,
+                                       const LockedFrames& locked, Journal& journal);
 
 }  // namespace baton

@@ -8,6 +8,7 @@
 
 #include "common/base/limits.h"
 #include "common/base/utc.h"
+#include "common/job/text/frame_range.h"
 
 namespace baton {
 namespace {
@@ -98,6 +99,15 @@ Status History::deleted(const Digest& version) {
   const JobId job = jobs_.of(version).id;
   jobs_.forget(job);
   return tell({.kind = FarmEventKind::job_deleted, .job = job});
+}
+
+Status History::locked(const Digest& version, const std::vector<FrameNumber>& frames,
+                       bool is_locked) {
+  const JobId job = jobs_.of(version).id;
+  BATON_TRY(jobs_.set_locked(journal_, job, frames, is_locked));
+  return tell({.kind = is_locked ? FarmEventKind::frames_locked : FarmEventKind::frames_unlocked,
+               .job = job,
+               .reason = "frames " + format_frames(frames)});
 }
 
 Status History::granted(const Scheduler::Job& job, const LeaseId& lease,

@@ -31,6 +31,8 @@ class History {
   Status submitted(const Digest& document, const JobId& job, const std::string& reason);
   Status status_changed(const Digest& version, JobStatus status, const std::string& reason);
   Status deleted(const Digest& version);
+  /// Frames of the job count as done from now on, or no longer.
+  Status locked(const Digest& version, const std::vector<FrameNumber>& frames, bool is_locked);
   Status granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker);
   /// job: null: it is forgotten.
   Status lease_ended(const Scheduler::Job* job, const TellLeaseEnd& end);

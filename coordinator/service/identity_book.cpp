@@ -14,13 +14,25 @@ Result<IdentityBook> IdentityBook::read(Journal& journal) {
     const auto job = book.jobs_.find(id);
     if (job != book.jobs_.end()) job->second.times = of_job;
   }
+  BATON_ASSIGN(const auto locked, journal.locked_frames());
+  for (const auto& [id, frames] : locked) {
+    const auto job = book.jobs_.find(id);
+    if (job != book.jobs_.end()) job->second.locked = frames;
+  }
   return book;
 }
 
 JobIdentity IdentityBook::of(const Digest& document) const {
   const auto version = documents_.find(document);
   if (version == documents_.end()) return {};
-  return {version->second.id, version->second.number, jobs_.at(version->second.id).times};
+  const JobId& id = version->second.id;
+  return {id, version->second.number, jobs_.at(id).times, locked(id)};
+}
+
+std::vector<FrameNumber> IdentityBook::locked(const JobId& job) const {
+  const auto found = jobs_.find(job);
+  if (found == jobs_.end()) return {};
+  return {found->second.locked.begin(), found->second.locked.end()};
 }
 
 bool IdentityBook::is_newest(const Digest& document) const {
@@ -54,6 +66,18 @@ Status IdentityBook::set_times(Journal& journal, const JobId& job, const JobTime
   if (found == jobs_.end() || found->second.times == times) return {};
   found->second.times = times;
   return journal.record_times(job, times);
+}
+
+Status IdentityBook::set_locked(Journal& journal, const JobId& job,
+                                const std::vector<FrameNumber>& frames, bool is_locked) {
+  const auto found = jobs_.find(job);
+  if (found == jobs_.end()) return {};
+  for (const FrameNumber frame : frames) {
+    BATON_TRY(journal.record_lock(job, frame, is_locked));
+    if (is_locked) found->second.locked.insert(frame);
+    if (!is_locked) found->second.locked.erase(frame);
+  }
+  return {};
 }
 
 void IdentityBook::forget(const JobId& job) {

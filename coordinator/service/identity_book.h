@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -9,14 +10,16 @@
 
 namespace baton {
 
-/// Which document is a version of which job, and when what happened to that. What it learns it puts
-/// into the journal.
+/// Which document is a version of which job, when what happened to that, and which frames of it are
+/// locked. What it learns it puts into the journal.
 class IdentityBook {
  public:
   static Result<IdentityBook> read(Journal& journal);
 
   /// An empty ID: the document is no version of any job.
   JobIdentity of(const Digest& document) const;
+  /// JobIdentity::locked of a job; none where it is not known.
+  std::vector<FrameNumber> locked(const JobId& job) const;
   bool is_newest(const Digest& document) const;
   /// Oldest first; none where the job is not known.
   std::vector<Digest> versions(const JobId& job) const;
@@ -26,12 +29,16 @@ class IdentityBook {
   Status add_version(Journal& journal, const Digest& document, const JobId& job);
   /// Replaces the times of a job that is known.
   Status set_times(Journal& journal, const JobId& job, const JobTimes& times);
+  /// The frames count as done from now on, or no longer.
+  Status set_locked(Journal& journal, const JobId& job, const std::vector<FrameNumber>& frames,
+                    bool is_locked);
   /// The job is forgotten here; the journal forgets it with its documents.
   void forget(const JobId& job);
 
  private:
   struct Job {
     JobTimes times;
+    std::set<FrameNumber> locked;
     std::map<std::int32_t, Digest> versions;
   };
   std::map<JobId, Job> jobs_;

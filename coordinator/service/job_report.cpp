@@ -112,7 +112,7 @@ std::vector<std::string> lost_reasons(const LostFiles& lost) {
 }
 
 LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const FileTable& files,
-                          bool restart) {
+                          const LockedFrames& locked, bool restart) {
   // What is recorded as done, and which blobs that leaves.
   JobTasks recorded(job.spec);
   BlobReferences references;
@@ -148,14 +148,17 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const Fil
     if (recorded.book().status(frame) != TaskStatus::done) continue;
     ++lost.num_frames;
     const fs::path path = frame_path(job.spec, FrameIndex(frame));
-    const FileVerdict verdict = files.judge(path, recorded.made().outputs(frame).front());
-    const bool is_strange = verdict.state == FileState::strange;
+    const bool is_locked = locked.contains(FrameIndex(frame));
+    const FileVerdict verdict =
+        is_locked ? judge_locked(path) : files.judge(path, recorded.made().outputs(frame).front());
+    const bool is_strange =
+        verdict.state == FileState::strange || (is_locked && verdict.state == FileState::absent);
     if (verdict.state == FileState::right) continue;
-    if (verdict.state == FileState::unreadable && !restart) {
+    if (verdict.state == FileState::unreadable && (!restart || is_locked)) {
       if (!lost.unreadable) lost.unreadable = verdict.fault;
       continue;
     }
-    if (verdict.state == FileState::unknown || (is_strange && !restart)) {
+    if (verdict.state == FileState::unknown || (is_strange && (!restart || is_locked))) {
       ++(is_strange ? lost.num_strange : lost.num_unknown);
       continue;
     }

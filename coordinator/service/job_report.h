@@ -9,6 +9,7 @@
 #include "coordinator/journal/journal.h"
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/service/file_table.h"
+#include "coordinator/service/locked_frames.h"
 
 namespace baton {
 
@@ -36,7 +37,8 @@ struct LostFiles {
   /// Why it cannot be told now, of a file or folder.
   std::optional<std::string> unreadable;
   std::size_t num_frames = 0;  ///< finished, lost or not
-  /// Frames whose bytes must be read to tell, and frames that are others' now: not lost.
+  /// Frames whose bytes must be read to tell, and frames that are others' now, or locked and gone:
+  /// not lost.
   std::size_t num_unknown = 0, num_strange = 0;
 
   bool all_frames_right() const {
@@ -46,7 +48,7 @@ struct LostFiles {
 /// restart: another picture in the place of a frame is lost, too, and a folder that is not there is
 /// an empty one.
 LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const FileTable& files,
-                          bool restart = false);
+                          const LockedFrames& locked, bool restart = false);
 /// For people, of what is lost: empty, or lines.
 std::vector<std::string> lost_reasons(const LostFiles& lost);
 

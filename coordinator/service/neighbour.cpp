@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
 
 namespace baton {
@@ -40,6 +41,14 @@ std::string differing_text(const std::vector<std::string>& differing) {
   return fmt::format("{}{}", fmt::join(shown, ", "), differing.size() > kMost ? ", ..." : "");
 }
 
+Error locked_elsewhere(const JobSpec& job, const Neighbour& other, const std::string& other_name) {
+  return {ErrorKind::bad_input,
+          fmt::format("job '{}': frames {} in {} are locked in job {}, and stay: `baton job lock "
+                      "{} --off --frames {}` unlocks them, another output.directory keeps them",
+                      job.name, format_frames(other.locked), job.output.directory, other_name,
+                      other_name, format_frames(other.locked))};
+}
+
 Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job,
                       const std::string& other_name) {
   std::string text = fmt::format(
@@ -56,7 +65,8 @@ Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec&
 }
 
 Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
-                  const FileTable& files, const std::vector<FrameNumber>* owned) {
+                  const FileTable& files, const std::vector<FrameNumber>* owned,
+                  const Locks& locks) {
   const JobStatus status = former.status;
   Neighbour other{job, status, {}, {}, {}, false, 0};
   const JobSpec& theirs = former.document.job;
@@ -72,6 +82,8 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
   const FrameComparison comparison(former.document, wanted);
   std::set<std::string> differing;
   for (const auto& [mine, its] : shared) {
+    if (locks.theirs.contains(mine)) other.locked.push_back(theirs.frames[mine.index()]);
+    if (locks.mine.contains(its)) continue;
     const auto image = images.find(mine);
     const bool is_owned =
         owned == nullptr ||

@@ -6,6 +6,7 @@
 
 #include "coordinator/schedule/adoption.h"
 #include "coordinator/service/file_table.h"
+#include "coordinator/service/locked_frames.h"
 
 namespace baton {
 
@@ -22,15 +23,25 @@ struct Neighbour {
   std::size_t num_there = 0;  ///< frames in common that it has written
   /// Frames that it has not written and the new one does not have.
   std::vector<FrameNumber> left_out = {};
+  /// Frames in common that are locked in it, as a job of its own.
+  std::vector<FrameNumber> locked = {};
+};
+
+/// Which frames stay as they are: of the former job, where it is another one, and of the new one.
+struct Locks {
+  LockedFrames theirs, mine;
 };
 
 /// What a journalled job has written, beside a new one. owned: its frames by number, without those
 /// that another one has replaced; null: all.
 Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
-                  const FileTable& files, const std::vector<FrameNumber>* owned);
+                  const FileTable& files, const std::vector<FrameNumber>* owned,
+                  const Locks& locks = {});
 
 /// Some of what differs, for people.
 std::string differing_text(const std::vector<std::string>& differing);
+/// Why a job is refused that would replace frames that are locked in another one.
+Error locked_elsewhere(const JobSpec& job, const Neighbour& other, const std::string& other_name);
 /// Why a job is refused whose frames would replace those of another picture. other_name: short, of
 /// that job.
 Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job,

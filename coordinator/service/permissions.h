@@ -38,6 +38,7 @@ template <> inline constexpr Rights kRights<ListEvents>         {"list events", 
 template <> inline constexpr Rights kRights<PauseJob>           {"pause jobs",    May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<ResumeJob>          {"resume jobs",   May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<CancelJob>          {"cancel jobs",   May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<LockFrames>         {"lock frames",   May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<DeleteJob>          {"delete jobs",   May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<DrainWorker>        {"drain workers", May::no,  May::no,  May::yes};
 template <> inline constexpr Rights kRights<StopCoordinator>    {"stop the farm", May::no,  May::no,  May::yes};

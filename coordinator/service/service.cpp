@@ -10,6 +10,7 @@
 #include "common/base/limits.h"
 #include "common/store/folder_token.h"
 #include "coordinator/service/evidence.h"
+#include "coordinator/service/file_room.h"
 #include "coordinator/service/permissions.h"
 
 namespace baton {
@@ -37,6 +38,7 @@ Status check_leases(const std::vector<LeaseId>& running) {
 // ---- the loop -----------------------------------------------------------------------------------
 
 Result<Service> Service::open(const ServiceOptions& options) {
+  raise_file_limit();
   std::error_code error;
   fs::create_directories(options.work_dir, error);
   if (error) {
@@ -117,6 +119,10 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   if (is_new && farm_.peers.num_workers() >= limits::kMaxWorkers) {
     return farm_.refuse(peer, {ErrorKind::io, fmt::format("the farm is full: {} workers",
                                                           farm_.peers.num_workers())});
+  }
+  if (const auto lack = is_new ? lack_of_descriptors() : std::nullopt) {
+    tell("workers are refused: " + *lack);
+    return farm_.refuse(peer, {ErrorKind::io, "the farm is full: " + *lack});
   }
   if (const std::optional<std::string> difference = other_build(hello)) {
     if (!farm_.options.mixed_builds) {

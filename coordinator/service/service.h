@@ -76,6 +76,7 @@ class Service {
   Status receive(const PeerId& peer, const CancelJob& message);
   Status receive(const PeerId& peer, const PauseJob& message);
   Status receive(const PeerId& peer, const ResumeJob& message);
+  Status receive(const PeerId& peer, const LockFrames& message);
   Status receive(const PeerId& peer, const DeleteJob& message);
   Status receive(const PeerId& peer, const DrainWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
@@ -92,11 +93,13 @@ class Service {
   bool await_inputs(const std::string& worker, const TaskFailed& message);
   bool await_outputs(const TaskDone& message);
   Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
-                                                const Digest& job, const JobSpec& spec);
+                                                const Digest& job, const JobSpec& spec,
+                                                const LockedFrames& locked);
 
   // Frames and their folder, while a job runs and at its end (service_frames.cpp).
   void start_inspections();
   Status end_inspection(const FilesRead& read);
+  bool may_pass(const Digest& job);
   Result<bool> watch_folder(const Digest& job);
 
   void keep_notes(const TaskDone& report);
@@ -110,6 +113,8 @@ class Service {
   TimePoint next_clean_up_;
   bool stop_requested_ = false;
   bool has_unread_jobs_ = false;  ///< in the journal
+  /// So long a start waits for files that cannot be read.
+  TimePoint patient_until_{};
   /// Reports whose files are not there yet, and since when.
   std::map<LeaseId, TimePoint> late_;
   /// Jobs with a frame that is, and since when.

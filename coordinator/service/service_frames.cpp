@@ -3,6 +3,7 @@
 
 #include "coordinator/service/frame_inspection.h"
 #include "coordinator/service/service.h"
+#include "coordinator/service/submission.h"
 
 namespace baton {
 namespace {
@@ -40,8 +41,19 @@ void Service::start_inspections() {
     const auto& [digest, due] = wanted;
     const Scheduler::Job* const job = farm_.scheduler.find_job(digest);
     return job == nullptr || job->status != JobStatus::running ||
-           (due <= now && waits_->inspect({digest}, files_to_inspect(*job, files_)));
+           (due <= now &&
+            waits_->inspect({digest},
+                            files_to_inspect(*job, files_, farm_.locked(digest, job->spec))));
   });
+}
+
+/// Whether a frame of the job that cannot be read is waited for: not for longer than file_patience.
+bool Service::may_pass(const Digest& job) {
+  const TimePoint now = std::chrono::steady_clock::now();
+  const TimePoint since = unreadable_.try_emplace(job, now).first->second;
+  if (now - since < farm_.options.file_patience) return true;
+  unreadable_.erase(job);
+  return false;
 }
 
 /// Only here is a job done. One whose frames are read while it runs gets back what it lacks.
@@ -49,14 +61,11 @@ Status Service::end_inspection(const FilesRead& read) {
   const Digest digest = std::get<InspectionOf>(read.reason).job;
   const Scheduler::Job* const job = farm_.scheduler.find_job(digest);
   if (job == nullptr || job->status != JobStatus::running) return {};
-  BATON_ASSIGN(const InspectedFrames found, inspect_frames(*job, read.contents, farm_.journal));
+  BATON_ASSIGN(const InspectedFrames found,
+               inspect_frames(*job, read.contents, farm_.locked(digest, job->spec), farm_.journal));
   // What changes while it is read, or cannot be read now, may stand otherwise in a moment.
-  const TimePoint now = std::chrono::steady_clock::now();
-  const bool may_pass =
-      !found.unreadable.empty() &&
-      now - unreadable_.try_emplace(digest, now).first->second < farm_.options.file_patience;
-  if (found.is_stale || may_pass) {
-    farm_.to_inspect.emplace(digest, now + kInspectAgain);
+  if (found.is_stale || (!found.unreadable.empty() && may_pass(digest))) {
+    farm_.to_inspect.emplace(digest, std::chrono::steady_clock::now() + kInspectAgain);
     return {};
   }
   unreadable_.erase(digest);
@@ -79,7 +88,13 @@ Status Service::end_inspection(const FilesRead& read) {
     return farm_.step(JobPaused{digest, "a frame that can be read: " + found.unreadable});
   }
   if (found.lost.empty() && job->tasks.book().counts().open > 0) return {};
-  return farm_.step(FramesInspected{digest, found.lost, strange_text(found.strange)});
+  const TaskCounts& tasks = job->tasks.book().counts();
+  if (found.lost.empty() && found.doubt.empty() && tasks.failed == 0) {
+    farm_.history.set_actor({});
+    return Submission(farm_, files_, speaker_).finish(digest);
+  }
+  return farm_.step(FramesInspected{digest, found.lost,
+                                    doubt_text(found.doubt, farm_.history.jobs().of(digest).id)});
 }
 
 }  // namespace baton

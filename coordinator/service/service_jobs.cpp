@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <functional>
+#include <thread>
 #include <utility>
 
 #include "common/base/archive.h"
 #include "common/base/limits.h"
 #include "common/base/size_text.h"
 #include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/plan_text.h"
@@ -39,6 +41,7 @@ Status Service::restore_jobs() {
   BATON_TRY(farm_.history.read());
   BATON_TRY(farm_.take_up_marks());
   BATON_ASSIGN(const std::vector<Digest> jobs, farm_.journal.jobs());
+  patient_until_ = std::chrono::steady_clock::now() + farm_.options.file_patience;
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
   BATON_TRY(farm_.archive_ended());
   BATON_TRY(farm_.count_kept());
@@ -100,7 +103,11 @@ Status Service::restore_job(const Digest& digest) {
         files_.add(
             {frame_path(event.spec, file.frame), file.stamp, file.digest, {}, std::string()});
     }
-    LostFiles lost = find_lost_files(event, farm_.store, files_);
+    LostFiles lost = find_lost_files(event, farm_.store, files_, farm_.locked(digest, event.spec));
+    while (lost.unreadable && std::chrono::steady_clock::now() < patient_until_) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      lost = find_lost_files(event, farm_.store, files_, farm_.locked(digest, event.spec));
+    }
     const std::optional<std::string> mark = farm_.lost_mark(digest, event.spec);
     lacks_mark = mark && lost.all_frames_right();
     if (mark && !lacks_mark && !lost.unreadable) lost.unreadable = mark;
@@ -144,7 +151,8 @@ Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
     if (const Result<bool> watched = watch_folder(message.job); !watched) return watched.error();
     BATON_ASSIGN(token, farm_.mark_output(message.job));
   }
-  return farm_.reply(peer, JobDocument{message.job, std::move(*document), std::move(token)});
+  return farm_.reply(peer, JobDocument{message.job, std::move(*document), std::move(token),
+                                       farm_.history.jobs().of(message.job).id});
 }
 
 void Service::tell_lost(const Digest& job, const LostFiles& lost) const {
@@ -165,6 +173,12 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
     return farm_.refuse(peer, within.error());
   }
+  Submission submission(farm_, files_, speaker_);
+  SubmitJob wanted = message;
+  BATON_ASSIGN(wanted.json,
+               submission.with_written_sweeps(*document, message.json, message.restart));
+  if (wanted.json != message.json) document = parse_job_document(wanted.json);
+  if (!document) return farm_.refuse(peer, document.error());
   if (const std::int64_t count = count_tasks(document->job); count > limits::kMaxTasksPerJob) {
     return farm_.refuse(
         peer,
@@ -174,27 +188,34 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   }
   if (const Status folder = expect_folder(document->job.output.directory); !folder)
     return farm_.refuse(peer, folder.error());
+  BATON_ASSIGN(const JobId id, submission.known_job(*document));
+  const LockedFrames locked(document->job, farm_.history.jobs().locked(id));
   BATON_ASSIGN(const std::optional<OddFrames> odd,
-               await_frames(peer, message, document->digest, document->job));
+               await_frames(peer, message, document->digest, document->job, locked));
   if (!odd) return {};
   const Scheduler::Job* const known = farm_.scheduler.find_job(document->digest);
   const bool runs = known != nullptr && known->status == JobStatus::running;
-  const std::string& fault = odd->unreadable.empty() ? strange_text(odd->strange) : odd->unreadable;
-  if (!fault.empty() && !message.restart && !runs)
+  const std::string fault = odd->unreadable.empty() ? doubt_text(odd->doubt, id) : odd->unreadable;
+  const bool may_replace = message.restart && odd->doubt.locked_absent.empty();
+  if (!odd->unreadable.empty() && !may_replace && !runs && may_pass(document->digest))
+    return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + odd->unreadable});
+  unreadable_.erase(document->digest);
+  if (!fault.empty() && !may_replace && !runs)
     return farm_.refuse(peer,
                         {ErrorKind::io, fmt::format("job '{}': {}", document->job.name, fault)});
-  return Submission(farm_, files_, speaker_).submit(peer, *document, message);
+  return submission.submit(peer, *document, wanted);
 }
 
 /// The frames that a message about a job would replace or keep. nullopt: some must be read, and the
 /// message waits.
 Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const Message& message,
-                                                       const Digest& job, const JobSpec& spec) {
+                                                       const Digest& job, const JobSpec& spec,
+                                                       const LockedFrames& locked) {
   const TimePoint now = std::chrono::steady_clock::now();
   const Incoming incoming{peer, message, speaker_};
   if (waits_->join(job, incoming, now)) return std::optional<OddFrames>();
   BATON_ASSIGN(const FolderRecord record, FolderRecord::read(farm_.journal, folder_of(spec)));
-  OddFrames odd = find_odd_frames(record, files_, job, spec);
+  OddFrames odd = find_odd_frames(record, files_, job, spec, locked);
   if (odd.unread.empty()) return std::optional(std::move(odd));
   const std::string text = fmt::format("job '{}': looking at {} frames in {}", spec.name,
                                        odd.unread.size(), spec.output.directory);
@@ -222,7 +243,7 @@ Status Service::receive(const PeerId& peer, const ListJobs& message) {
   for (const Digest& version : farm_.scheduler.jobs()) {
     const Scheduler::Job& job = *farm_.scheduler.find_job(version);
     num_open += is_open(job.status) ? 1 : 0;
-    if (known.is_newest(version)) list.jobs.push_back({{}, summarize(version, job)});
+    if (known.is_newest(version)) list.jobs.push_back({known.of(version), summarize(version, job)});
   }
   list.num_ended = known.num_jobs() - num_open;
   for (ListedJob& job : list.jobs) {
@@ -262,6 +283,12 @@ Status Service::receive(const PeerId& peer, const ListEvents& message) {
   }
   EventList list;
   BATON_ASSIGN(list.events, farm_.journal.events(query));
+  if (!query.job.empty()) {
+    BATON_ASSIGN(const auto sums, farm_.journal.event_sums(query.job));
+    for (const auto& [kind, sum] : sums) {
+      if (kind <= last_of(kind)) list.forgotten.push_back({kind, sum.count, sum.seconds});
+    }
+  }
   return farm_.reply(peer, std::move(list));
 }
 
@@ -292,9 +319,11 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
   const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
   if (known != nullptr && known->status == JobStatus::paused) {
     BATON_ASSIGN(const std::optional<OddFrames> odd,
-                 await_frames(peer, message, *job, known->spec));
+                 await_frames(peer, message, *job, known->spec, farm_.locked(*job, known->spec)));
     if (!odd) return {};
     BATON_ASSIGN(LostFiles lost, Submission(farm_, files_, speaker_).lost_files_of(*job));
+    if (lost.unreadable && may_pass(*job))
+      return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + *lost.unreadable});
     if (lost.unreadable) {
       return farm_.refuse(
           peer, {ErrorKind::io, fmt::format("job {} stays paused: {}", farm_.history.name_of(*job),
@@ -306,6 +335,33 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
     plan = plan_text(*farm_.scheduler.find_job(*job), reasons);
   }
   return answer_detail(peer, *job, std::move(plan));
+}
+
+/// Frames are locked whose files are there and that nobody writes now.
+Status Service::receive(const PeerId& peer, const LockFrames& message) {
+  const Result<Digest> job = resolve_own(message.job);
+  if (!job) return farm_.refuse(peer, job.error());
+  BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
+  const Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
+  if (!document) return farm_.refuse(peer, document.error());
+  std::vector<FrameNumber> frames = message.frames;
+  std::ranges::sort(frames);
+  frames.erase(std::ranges::unique(frames).begin(), frames.end());
+  std::vector<FrameIndex> places;
+  if (message.off) {
+    const Status may = expect_locked(farm_.history.jobs().of(*job), frames);
+    if (!may) return farm_.refuse(peer, may.error());
+  } else {
+    Result<std::vector<FrameIndex>> found =
+        frames_to_lock(document->job, frames, farm_.scheduler.find_job(*job));
+    if (!found) return farm_.refuse(peer, found.error());
+    places = std::move(found).value();
+  }
+  BATON_TRY(farm_.history.locked(*job, frames, !message.off));
+  spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
+               message.off ? "unlocked" : "locked");
+  BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
+  return answer_detail(peer, *job);
 }
 
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
@@ -362,8 +418,10 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
 
 /// Describes a job that is known here or in the archive.
 Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
+  BATON_ASSIGN(JobGrowth growth, farm_.journal.growth(farm_.history.jobs().of(job).id));
   if (farm_.scheduler.find_job(job) != nullptr) {
     ShownJob shown{farm_.history.jobs().of(job), {}};
+    shown.growth = growth.said;
     shown.lacks_renderer =
         farm_.scheduler.leases().nobody_renders_as(farm_.scheduler.find_job(job)->renderer);
     BATON_ASSIGN(shown.detail, farm_.living_detail(job));
@@ -378,7 +436,8 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
                fmt::format("job {}: its document cannot be read", farm_.history.name_of(job))});
   }
   detail->summary.owner = farm_.owner_of(job);
-  return farm_.reply(peer, ShownJob{farm_.history.jobs().of(job), std::move(*detail)});
+  return farm_.reply(peer, ShownJob{farm_.history.jobs().of(job), std::move(*detail), false,
+                                    std::move(growth.said)});
 }
 
 }  // namespace baton

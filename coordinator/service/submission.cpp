@@ -10,6 +10,8 @@
 
 #include "common/base/archive.h"
 #include "common/base/limits.h"
+#include "common/base/utc.h"
+#include "common/job/plan/next_sweeps.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "coordinator/service/neighbour.h"
@@ -33,9 +35,9 @@ Result<std::optional<FormerJob>> Submission::former_job(const Digest& digest) {
   return std::optional(std::move(former));
 }
 
-/// The job that the document is, or becomes, a version of: the one that had it before, else the one
-/// of its name that the same speaker has in its folder, else a new one.
-Result<JobId> Submission::identify(const ParsedJobDocument& document) {
+/// The one that had the document before, else the one of its name that the same speaker has in its
+/// folder.
+Result<JobId> Submission::known_job(const ParsedJobDocument& document) {
   const IdentityBook& known = farm_.history.jobs();
   if (const JobId before = known.of(document.digest).id; !before.empty()) return before;
   BATON_ASSIGN(const std::vector<Digest> namesakes,
@@ -44,7 +46,7 @@ Result<JobId> Submission::identify(const ParsedJobDocument& document) {
       std::ranges::find_if(namesakes.rbegin(), namesakes.rend(), [&](const Digest& v) {
         return farm_.owner_of(v) == speaker_.name && !known.of(v).id.empty();
       });
-  return same == namesakes.rend() ? JobId::draw() : known.of(*same).id;
+  return same == namesakes.rend() ? JobId() : known.of(*same).id;
 }
 
 /// What stands in the way of a new version of `job`: a folder has one open job, and a frame in it
@@ -60,9 +62,15 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
     BATON_ASSIGN(const std::optional<FormerJob> former, former_job(digest));
     if (!former) continue;
     BATON_ASSIGN(const std::optional<JobDetail> ended, farm_.archived_detail(digest));
+    const JobIdentity who = farm_.history.jobs().of(digest);
+    const bool is_former_version = who.id == job;
+    const Locks locks{
+        is_former_version ? LockedFrames() : LockedFrames(former->document.job, who.locked),
+        LockedFrames(document.job, farm_.history.jobs().locked(job))};
     Neighbour other =
-        look_at(*former, digest, document, files_, ended ? &ended->frames_done : nullptr);
-    const bool is_former_version = farm_.history.jobs().of(digest).id == job;
+        look_at(*former, digest, document, files_, ended ? &ended->frames_done : nullptr, locks);
+    if (!other.locked.empty())
+      return locked_elsewhere(document.job, other, farm_.history.name_of(digest));
     if (other.busy && !restart && !is_former_version) {
       return Error{
           ErrorKind::bad_input,
@@ -74,7 +82,7 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
     if (!other.differing.empty() && !restart)
       return another_picture(document.job, other, former->document.job,
                              farm_.history.name_of(digest));
-    if (other.written.empty() && !other.busy) continue;
+    if (other.written.empty() && !is_open(other.status)) continue;
     if (is_open(other.status) || !other.differing.empty())
       BATON_TRY(farm_.check_own(speaker_, digest));
     others.push_back(std::move(other));
@@ -127,6 +135,111 @@ Status Submission::disown(const Digest& job, const std::vector<FrameNumber>& fra
                                          to_bytes(*detail));
 }
 
+// ---- jobs that grow -----------------------------------------------------------------------------
+
+/// Sweeps of the frames that jobs of the picture have written in the folder; 0: there are none.
+Result<int> Submission::written_sweeps(const ParsedJobDocument& document) {
+  int sweeps = 0;
+  BATON_ASSIGN(const std::vector<Digest> neighbours,
+               farm_.journal.jobs_in(folder_of(document.job)));
+  for (const Digest& digest : neighbours) {
+    BATON_ASSIGN(const std::optional<FormerJob> former, former_job(digest));
+    if (!former || former->document.picture != document.picture) continue;
+    const bool has_frames = std::ranges::any_of(former->tasks, [](const Completions::Task& task) {
+      return task.task.kind == TaskKind::assemble && !task.outputs.empty() &&
+             !task.outputs.front().is_any_image();
+    });
+    if (has_frames) sweeps = std::max(sweeps, former->document.job.quality.sweeps);
+  }
+  return sweeps;
+}
+
+Result<std::string> Submission::with_written_sweeps(const ParsedJobDocument& document,
+                                                    const std::string& text, bool restart) {
+  const QualitySpec& quality = document.job.quality;
+  if (!quality.may_grow()) return text;
+  int sweeps = 0;
+  if (!restart) {
+    BATON_ASSIGN(sweeps, written_sweeps(document));
+    // What it has decided to add it goes on with.
+    BATON_ASSIGN(const JobId id, known_job(document));
+    const std::vector<Digest> versions = farm_.history.jobs().versions(id);
+    const Scheduler::Job* const open =
+        versions.empty() ? nullptr : farm_.scheduler.find_job(versions.back());
+    if (open != nullptr && is_open(open->status)) {
+      QualitySpec as_before = open->spec.quality;
+      as_before.sweeps = quality.sweeps;
+      as_before.refinable = quality.refinable;
+      if (as_before == quality) sweeps = std::max(sweeps, open->spec.quality.sweeps);
+    }
+  }
+  return with_sweeps(document, std::max(sweeps, quality.sweeps));
+}
+
+/// A person submits it: its time and the number of its sweeps count from now on.
+Status Submission::begin_growth(const ParsedJobDocument& document, bool restart) {
+  if (!document.job.quality.may_grow()) return {};
+  BATON_ASSIGN(const int written, restart ? Result<int>(0) : written_sweeps(document));
+  return farm_.journal.record_growth(farm_.history.jobs().of(document.digest).id,
+                                     {now_ms(), written, {}});
+}
+
+/// Whether a job of which all frames are there gets more sweeps, which are a new version of it.
+Result<bool> Submission::grow(const Digest& version) {
+  const Scheduler::Job& job = *farm_.scheduler.find_job(version);
+  const QualitySpec& quality = job.spec.quality;
+  if (!quality.may_grow()) return false;
+  const JobId id = farm_.history.jobs().of(version).id;
+  BATON_ASSIGN(JobGrowth growth, farm_.journal.growth(id));
+
+  // By its noisiest frame; what is locked never becomes cleaner.
+  const LockedFrames locked = farm_.locked(version, job.spec);
+  float noise = 0;
+  for (const auto& [frame, stats] : job.tasks.frames()) {
+    if (!locked.contains(frame)) noise = std::max(noise, stats.quality.cycles_noise);
+  }
+  const bool is_blind = quality.noise_threshold && noise == 0;
+  const double seconds = static_cast<double>(now_ms() - growth.since_ms) / 1000;
+  const int next = is_blind
+                       ? quality.sweeps
+                       : next_sweeps(quality, noise, seconds, quality.sweeps - growth.first_sweeps);
+  std::string said = is_blind ? std::string("no frame tells its noise here: no more rounds")
+                              : fmt::format("{} rounds: noise {:.3g} as Cycles measures it",
+                                            std::int64_t{quality.rounds} * quality.sweeps, noise);
+  bool grows = next > quality.sweeps;
+  if (grows) {
+    const std::string more =
+        fmt::format("{}; {} more", said, std::int64_t{next - quality.sweeps} * quality.rounds);
+    const Speaker owner{Role::user, farm_.owner_of(version)};
+    const Status begun = Submission(farm_, files_, owner).add_sweeps(version, next, more);
+    if (!begun && begun.error().kind != ErrorKind::bad_input &&
+        begun.error().kind != ErrorKind::usage)
+      return begun.error();
+    grows = begun.ok();
+    said = grows ? more : fmt::format("{}; no more: {}", said, begun.error().message);
+  }
+  spdlog::info("job {}: {}", farm_.history.name_of(version), said);
+  growth.said.push_back(std::move(said));
+  BATON_TRY(farm_.journal.record_growth(id, growth));
+  return grows;
+}
+
+/// Errors (bad_input, usage): something stands in the way; the version stays as it is.
+Status Submission::add_sweeps(const Digest& version, int sweeps, const std::string& reason) {
+  BATON_ASSIGN(const std::optional<std::string> before, farm_.journal.document(version));
+  BATON_ASSIGN(ParsedJobDocument former, parse_job_document(before.value_or("")));
+  const std::string text = with_sweeps(std::move(former), sweeps);
+  BATON_ASSIGN(const ParsedJobDocument document, parse_job_document(text));
+  if (const std::int64_t count = count_tasks(document.job); count > limits::kMaxTasksPerJob)
+    return Error{ErrorKind::bad_input, fmt::format("{} sweeps have {} tasks, at most {}", sweeps,
+                                                   count, limits::kMaxTasksPerJob)};
+  const JobId id = farm_.history.jobs().of(version).id;
+  BATON_ASSIGN(const std::vector<Neighbour> others, find_neighbours(document, id, false));
+  BATON_TRY(farm_.history.submitted(document.digest, id, reason));
+  BATON_ASSIGN(std::vector<std::string> reasons, make_way(document, others));
+  return begin({}, document, SubmitJob{text, false}, std::move(reasons));
+}
+
 // ---- submission ---------------------------------------------------------------------------------
 
 Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
@@ -144,6 +257,7 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     BATON_TRY(farm_.step(JobSuperseded{document.digest, {}}));
     BATON_TRY(farm_.archive_job(document.digest));
   } else if (known != nullptr) {
+    BATON_TRY(begin_growth(document, message.restart));
     return go_on(peer, document.digest, message.restart);
   }
 
@@ -152,7 +266,8 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
         peer, {ErrorKind::io,
                fmt::format("the farm is full: {} jobs that have not ended", limits::kMaxJobs)});
   }
-  BATON_ASSIGN(const JobId id, identify(document));
+  BATON_ASSIGN(JobId id, known_job(document));
+  if (id.empty()) id = JobId::draw();
   const Result<std::vector<Neighbour>> others = find_neighbours(document, id, message.restart);
   if (!others) {
     const ErrorKind kind = others.error().kind;
@@ -160,6 +275,7 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     return farm_.refuse(peer, others.error());
   }
   BATON_TRY(farm_.history.submitted(document.digest, id, message.restart ? "restart" : ""));
+  BATON_TRY(begin_growth(document, message.restart));
   BATON_ASSIGN(std::vector<std::string> reasons, make_way(document, *others));
   return begin(peer, document, message, std::move(reasons));
 }
@@ -168,30 +284,35 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
 Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
                          const SubmitJob& message, std::vector<std::string> reasons) {
   const Digest digest = document.digest;
-  BATON_ASSIGN(const Heritage heritage, find_heritage(document, message.restart, reasons));
+  const LockedFrames locked = farm_.locked(digest, document.job);
+  BATON_ASSIGN(const Heritage heritage, find_heritage(document, message.restart, locked, reasons));
 
   JobAdded event{digest, document.job, JobStatus::running, {}, {}};
   BATON_ASSIGN(const std::optional<std::string> known, farm_.journal.document(digest));
   BATON_TRY(take_over(heritage, known ? "" : message.json, event));
-  LostFiles lost = find_lost_files(event, farm_.store, files_);
-  const bool has_all = event.lost.empty() && lost.all_frames_right();
+  LostFiles lost = find_lost_files(event, farm_.store, files_, locked);
+  const bool is_right = event.lost.empty() && lost.all_frames_right();
   for (std::string& reason : lost_reasons(lost)) {
     if (std::find(reasons.begin(), reasons.end(), reason) == reasons.end())
       reasons.push_back(std::move(reason));
   }
   event.lost.insert(event.lost.end(), lost.tasks.begin(), lost.tasks.end());
   event.lost_spares = std::move(lost.spares);
+  if (std::string kept = locked_text(document.job, locked); !kept.empty())
+    reasons.push_back(std::move(kept));
 
   // The answer goes out before any lease of the job.
   const std::size_t place = farm_.num_replies();
   BATON_TRY(farm_.step(event));
-  if (has_all) BATON_TRY(farm_.step(FramesInspected{digest}));
-  BATON_TRY(farm_.mark_output(digest));
   const Scheduler::Job& job = *farm_.scheduler.find_job(digest);
+  const TaskCounts& tasks = job.tasks.book().counts();
+  const bool has_all = is_right && tasks.open == 0 && tasks.failed == 0;
+  if (!has_all) BATON_TRY(farm_.mark_output(digest));
   const std::string plan = plan_text(job, reasons);
-  const bool already_there = known && !is_open(job.status) && event.lost.empty();
-  farm_.reply_at(place, peer,
-                 JobAccepted{farm_.history.jobs().of(digest), digest, already_there, plan});
+  const bool already_there = known && has_all;
+  if (!peer.empty())
+    farm_.reply_at(place, peer,
+                   JobAccepted{farm_.history.jobs().of(digest), digest, already_there, plan});
   const std::string name = farm_.history.name_of(digest);
   spdlog::info("job {} {}: '{}', {} of {} tasks are done", name, known ? "goes on" : "submitted",
                job.spec.name, job.tasks.progress().tasks_done, job.tasks.progress().tasks_total);
@@ -204,13 +325,18 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
       if (farm_.scheduler.is_referenced(blob)) BATON_TRY(farm_.journal.let_go(former, blob));
     }
   }
-  return {};
+  return has_all ? finish(digest) : Status();
+}
+
+Status Submission::finish(const Digest& version) {
+  BATON_ASSIGN(const bool grows, grow(version));
+  return grows ? Status() : farm_.step(FramesInspected{version});
 }
 
 /// What jobs of the same picture in the same folder leave to a new one, itself among them.
 /// restart: nothing, where nobody who is connected renders as that was rendered.
 Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& document,
-                                                       bool restart,
+                                                       bool restart, const LockedFrames& locked,
                                                        std::vector<std::string>& reasons) {
   Heritage heritage;
   BATON_ASSIGN(const std::vector<Digest> neighbours,
@@ -233,7 +359,8 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
           [&](FrameIndex frame, const BlobRef& image) {
             return files_.is_right(frame_path(document.job, frame), image);
           },
-      .has_blob = [&](const BlobRef& blob) { return farm_.store.contains(blob.digest); }};
+      .has_blob = [&](const BlobRef& blob) { return farm_.store.contains(blob.digest); },
+      .locked = locked.frames()};
   heritage.adoption = adopt(document, formers, kept);
   const Adoption& adoption = heritage.adoption;
   if (!formers.empty()) {
@@ -319,6 +446,9 @@ Status Submission::go_on(const PeerId& peer, const Digest& digest, bool restart)
   std::vector<std::string> reasons = lost_reasons(lost);
   const auto noted = farm_.lost_before.find(digest);
   if (reasons.empty() && noted != farm_.lost_before.end()) reasons = noted->second;
+  const JobSpec& spec = farm_.scheduler.find_job(digest)->spec;
+  if (std::string kept = locked_text(spec, farm_.locked(digest, spec)); restart && !kept.empty())
+    reasons.push_back(std::move(kept));
   const std::size_t place = farm_.num_replies();
   if (runs && !lost.tasks.empty()) BATON_TRY(farm_.step(JobPaused{digest}));
   if (!runs || !lost.tasks.empty())
@@ -336,7 +466,7 @@ Result<LostFiles> Submission::lost_files_of(const Digest& job, bool restart) {
                                     .completions = std::move(known.completions),
                                     .failures = {},
                                     .plan = std::move(known.plan)},
-                                   farm_.store, files_, restart);
+                                   farm_.store, files_, farm_.locked(job, spec), restart);
   const std::optional<std::string> mark = restart ? std::nullopt : farm_.lost_mark(job, spec);
   if (!mark) return lost;
   if (lost.num_frames == 0 || lost.all_frames_right()) {

@@ -24,17 +24,29 @@ class Submission {
   /// Starts the job or lets it go on, and answers. The document is one that may be run, and its
   /// frames are known, as far as jobs of its folder have recorded them (find_odd_frames).
   Status submit(const PeerId& peer, const ParsedJobDocument& document, const SubmitJob& message);
+  /// The job that the document is a version of, or becomes one; empty: a new one.
+  Result<JobId> known_job(const ParsedJobDocument& document);
+  /// A document of a job that may grow gets the sweeps that jobs of its picture have written in its
+  /// folder, unless it is begun again; others stay as they are. Returns its text.
+  Result<std::string> with_written_sweeps(const ParsedJobDocument& document,
+                                          const std::string& text, bool restart);
+  /// All frames of a running job are there: it is done, or gets more sweeps (common/job/plan/
+  /// next_sweeps.h) as a new version.
+  Status finish(const Digest& version);
   /// What is not there of a job that the scheduler has. A folder without its mark that has all
   /// frames is the folder, and is marked again. restart: see find_lost_files.
   Result<LostFiles> lost_files_of(const Digest& job, bool restart = false);
 
  private:
   Result<std::optional<FormerJob>> former_job(const Digest& digest);
-  Result<JobId> identify(const ParsedJobDocument& document);
   Result<std::vector<Neighbour>> find_neighbours(const ParsedJobDocument& document,
                                                  const JobId& job, bool restart);
   Result<std::vector<std::string>> make_way(const ParsedJobDocument& document,
                                             const std::vector<Neighbour>& others);
+  Result<int> written_sweeps(const ParsedJobDocument& document);
+  Result<bool> grow(const Digest& version);
+  Status begin_growth(const ParsedJobDocument& document, bool restart);
+  Status add_sweeps(const Digest& version, int sweeps, const std::string& reason);
   Status disown(const Digest& job, const std::vector<FrameNumber>& frames, const std::string& by);
   Status go_on(const PeerId& peer, const Digest& digest, bool restart);
   Status begin(const PeerId& peer, const ParsedJobDocument& document, const SubmitJob& message,
@@ -46,7 +58,7 @@ class Submission {
     std::string renderer;
   };
   Result<Heritage> find_heritage(const ParsedJobDocument& document, bool restart,
-                                 std::vector<std::string>& reasons);
+                                 const LockedFrames& locked, std::vector<std::string>& reasons);
   Status take_over(const Heritage& heritage, const std::string& text, JobAdded& event);
 
   FarmCore& farm_;

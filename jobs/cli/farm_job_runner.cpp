@@ -49,7 +49,11 @@ Status FarmJobRunner::start() {
   return {};
 }
 
-Status FarmJobRunner::submit(const JobSpec& job, std::size_t index, std::vector<Open>& open) {
+Status FarmJobRunner::submit(const JobSpec& wanted, std::size_t index, std::vector<Open>& open) {
+  JobSpec job = wanted;
+  job.quality.noise_threshold.reset();
+  job.quality.time_limit.reset();
+  job.quality.max_rounds = 0;
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const std::optional<JobAccepted> accepted,
                ask_farm<JobAccepted>(*farm_, *client_, signals_,

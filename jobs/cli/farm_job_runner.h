@@ -37,7 +37,7 @@ class FarmJobRunner final : public JobRunner {
   };
 
   Status start();
-  Status submit(const JobSpec& job, std::size_t index, std::vector<Open>& open);
+  Status submit(const JobSpec& wanted, std::size_t index, std::vector<Open>& open);
   /// How far the job is; says once what it waits for. Error: it has failed.
   Result<JobSummary> ask(Open& job, const JobSpec& spec);
 

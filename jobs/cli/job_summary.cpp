@@ -45,6 +45,7 @@ void add_quality(const FrameQuality& q, ordered_json& row) {
     row["noiseError"] = q.noise_error;
     row["noiseFrom"] = noise_source_name(q.noise_source);
   }
+  if (q.cycles_noise > 0) row["cyclesNoise"] = q.cycles_noise;
   row["mean"] = q.mean;
   row["pixelsBelowZero"] = q.pixels_below_zero;
   row["lowest"] = q.lowest;
@@ -78,6 +79,10 @@ ordered_json judgement_json(std::span<const FrameReport> frames) {
 }
 
 }  // namespace
+
+ExitCode exit_code_of_stopped(JobStatus status) {
+  return is_open(status) ? ExitCode::io : exit_code_of(status);
+}
 
 ExitCode exit_code_of(JobStatus status) {
   if (status == JobStatus::failed) return ExitCode::failed;
@@ -273,6 +278,8 @@ ordered_json detail_json(const ShownJob& job) {
   result["framesDoneNumbers"] = ordered_json::array();
   for (const FrameNumber frame : detail.frames_done)
     result["framesDoneNumbers"].push_back(frame.value());
+  result["locked"] = ordered_json::array();
+  for (const FrameNumber frame : job.identity.locked) result["locked"].push_back(frame.value());
   if (!detail.waits.empty()) result["waits"] = detail.waits;
   result["judgement"] = judgement_json(detail.frames);
   result["frames"] = ordered_json::array();
@@ -282,6 +289,7 @@ ordered_json detail_json(const ShownJob& job) {
     add_quality(frame.quality, row);
     result["frames"].push_back(std::move(row));
   }
+  if (!job.growth.empty()) result["growth"] = job.growth;
   result["failures"] = detail.failures;
   result["warnings"] = detail.notes;
   return result;

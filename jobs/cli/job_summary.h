@@ -10,6 +10,8 @@ namespace baton {
 
 /// How a command about a job in this status ends; running and paused are ok.
 ExitCode exit_code_of(JobStatus status);
+/// The same of one that nobody follows any more: io where it waits for somebody.
+ExitCode exit_code_of_stopped(JobStatus status);
 /// The same; io where it has failed since frames are not what it has written.
 ExitCode exit_code_of(const JobDetail& detail);
 

@@ -2,6 +2,7 @@
 // $BATON_SYNC_RECORD and in the order in which they returned, what a program asks of the disk:
 //   rename FROM TO BYTES MS      sync FILE BYTES      syncfs DEVICE      remove FILE
 // MS: of the machine's monotonic clock, before the call.
+// Programs rename files in folders that they hold open (write_file_atomic).
 // From this a test tells what a power cut would have left (chaos.py), a benchmark what it waited
 // for (bench_sizes.cpp). A folder has no bytes.
 #include <dlfcn.h>
@@ -35,20 +36,32 @@ F original(const char* name) {
   return reinterpret_cast<F>(::dlsym(RTLD_NEXT, name));
 }
 
+/// Of an open file or folder; empty: it has none.
+std::array<char, 4096> path_of(int file) {
+  std::array<char, 64> link;
+  std::array<char, 4096> path{};
+  std::snprintf(link.data(), link.size(), "/proc/self/fd/%d", file);
+  if (::readlink(link.data(), path.data(), path.size() - 1) < 0) path[0] = 0;
+  return path;
+}
+
 long long num_bytes(const struct stat& status) {
   return S_ISREG(status.st_mode) ? static_cast<long long>(status.st_size) : 0;
 }
 
 }  // namespace
 
-extern "C" int rename(const char* from, const char* to) noexcept {
-  static const auto call = original<int (*)(const char*, const char*)>("rename");
+extern "C" int renameat(int from_folder, const char* from, int to_folder, const char* to) noexcept {
+  using Call = int (*)(int, const char*, int, const char*);
+  static const auto call = original<Call>("renameat");
   const auto since_start = std::chrono::steady_clock::now().time_since_epoch();
   const long long ms = std::chrono::duration_cast<std::chrono::milliseconds>(since_start).count();
-  const int result = call(from, to);
+  const int result = call(from_folder, from, to_folder, to);
   struct stat status {};
-  if (result == 0 && ::stat(to, &status) == 0)
-    note("rename %s %s %lld %lld\n", from, to, num_bytes(status), ms);
+  if (result == 0 && ::fstatat(to_folder, to, &status, 0) == 0) {
+    note("rename %s/%s %s/%s %lld %lld\n", path_of(from_folder).data(), from,
+         path_of(to_folder).data(), to, num_bytes(status), ms);
+  }
   return result;
 }
 
@@ -62,13 +75,9 @@ extern "C" int remove(const char* file) noexcept {
 extern "C" int fsync(int file) {
   static const auto call = original<int (*)(int)>("fsync");
   const int result = call(file);
-  std::array<char, 64> link;
-  std::array<char, 4096> path{};
-  std::snprintf(link.data(), link.size(), "/proc/self/fd/%d", file);
   struct stat status {};
-  if (result == 0 && ::fstat(file, &status) == 0 &&
-      ::readlink(link.data(), path.data(), path.size() - 1) > 0)
-    note("sync %s %lld\n", path.data(), num_bytes(status));
+  if (result == 0 && ::fstat(file, &status) == 0)
+    note("sync %s %lld\n", path_of(file).data(), num_bytes(status));
   return result;
 }
 

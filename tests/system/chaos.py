@@ -7,8 +7,8 @@ Real processes: one coordinator, three workers behind a proxy, three jobs at onc
 again and again until N faults have struck. Kinds of faults are dealt like cards, so that each comes once before any comes
 again. Then the farm is left alone, and each job must end as done. Files of jobs that are done are not struck.
 
-Checked at the end: the pixels are those of an undisturbed run; no task was done under two digests; nothing was done again
-that no fault explains; no lease was taken from a worker for the sake of an older one, and no older one was kept; when all is
+Checked at the end: the pixels are those of an undisturbed run with one instruction set and the job's last settings; no task was
+done under two digests; nothing was done again that no fault explains; no lease was taken from a worker for the sake of an older one, and no older one was kept; when all is
 done nobody reports any more; no temporary file is left. Where the machine lets it mount, the store lies on a small disk that
 is filled, folders become read-only, and power cuts take every file that no program had waited for the disk with.
 """
@@ -25,20 +25,11 @@ from pathlib import Path
 
 import chaos_witness as witness
 from chaos_disk import Disk, PowerCut, enter_namespace, may_mount
-from chaos_faults import KINDS, NUM_WORKERS, Chaos, Job
+from chaos_faults import NUM_WORKERS, Chaos
+from chaos_jobs import Undisturbed
 from farm import PATIENCE, Farm, Fault, Programs, check, wait_until
 
 END_S = 300 * PATIENCE
-
-
-def undisturbed(programs, folder):
-    """Kind -> pixels of its frames."""
-    pixels = {}
-    for kind in KINDS:
-        job = Job(kind, "-plain", folder)
-        programs.render(job.path, folder / f"work-{kind}", threads=2)
-        pixels[kind] = programs.pixels(job.frames)
-    return pixels
 
 
 def check_leftovers(farm):
@@ -62,20 +53,19 @@ def finish(chaos):
     wait_until(all_done, "all jobs are done", END_S)
 
 
-def judge(programs, chaos, farm, expected):
+def judge(chaos, farm, expected):
     """Everything that must hold at the end. Returns (tasks, superseded leases that workers named, tasks done again, how many
     of those are explained)."""
     for job in chaos.jobs:
-        got = programs.pixels(job.frames)
-        for frame, pixels in expected[job.kind].items():
-            check(got.get(frame) == pixels, f"{job.frames / frame}: {'other pixels' if frame in got else 'missing'}")
+        expected.check(job)
     check((farm.work_folder / "store/token").exists(), "the store's token is gone")
     check(chaos.proxy.is_quiet(4 * PATIENCE), "all is done, and somebody still reports")
     log, seen = farm.coordinator.log(), chaos.proxy.seen()
     check("BUG" not in log, "the coordinator has found a bug")
     num_tasks = witness.check_one_result_a_task(seen)
     witness.check_nothing_revoked(seen, chaos.proxy.returns(), chaos.proxy.struck_ms(), chaos.ended_jobs)
-    num_superseded = witness.check_superseded_revoked(seen, chaos.proxy.struck_ms(), witness.reopened(log))
+    num_superseded = witness.check_superseded_revoked(seen, chaos.proxy.struck_ms(), witness.reopened(log),
+                                                       {version: job.id for job in chaos.jobs for version in job.versions})
     again = witness.check_repeated(seen, log, chaos.struck, NUM_WORKERS, len(chaos.jobs), chaos.num_harmed)
     check_leftovers(farm)
     return (num_tasks, num_superseded, *again)
@@ -85,7 +75,7 @@ def run(programs, folder, num_faults, seed, longest_freeze_s=5):
     """Everything. Raises Fault."""
     rng = random.Random(seed)
     folder.mkdir(parents=True, exist_ok=True)
-    expected = undisturbed(programs, folder)
+    expected = Undisturbed(programs, folder / "plain")
     with contextlib.ExitStack() as stack:
         disk = Disk(folder / "farm/work", folder / "farm/frames") if may_mount() else None
         if disk:
@@ -105,7 +95,7 @@ def run(programs, folder, num_faults, seed, longest_freeze_s=5):
             time.sleep(rng.uniform(0, 0.5))
             chaos.strike()
         finish(chaos)
-        num_tasks, num_superseded, again, explained = judge(programs, chaos, farm, expected)
+        num_tasks, num_superseded, again, explained = judge(chaos, farm, expected)
     faults = ", ".join(f"{count} {what}" for what, count in sorted(chaos.struck.items()))
     print(f"seed {seed}: {chaos.struck.total()} faults on {len(chaos.jobs)} jobs ({faults}); {chaos.num_lost_in_cuts} files "
           f"lost in power cuts; {num_superseded} leases superseded; {num_tasks} tasks, {again} done again, {explained} "

@@ -1,64 +1,31 @@
 """What chaos.py strikes a farm with: programs, messages, files, disks and jobs."""
 
 import contextlib
-import functools
 import json
 import os
 import signal
+import subprocess
 import threading
 import time
 from collections import Counter
 from pathlib import Path
 
 from chaos_frames import NOTICED_S, FrameFaults, put_folder
+from chaos_jobs import FOREIGN_ISA, KINDS, Job, edits_of
 from chaos_witness import STATE, in_hand
 from farm import BAD_INPUT, OK, PATIENCE, check, wait_until
-from jobs import camera_keys, make_job, merged, write_job
 
 NUM_WORKERS = 3
 SUPERSEDED_S = 8 * PATIENCE  # so long after a worker fell silent its leases are another's, if there are any
 SUPERSEDER_STOPS_S = 0.5
+FOREIGN_S = 3 * PATIENCE  # a worker that is not refused in this time is not
+STRIKE_S = 240 * PATIENCE  # what does not strike in this time never will
 RECENT_LINES = 3000  # of the record: who has which lease
 
-KINDS = {
-    "rest": {"frames": "1-8", "sampling": {"method": "sequential", "numCandidates": 256, "numDistributions": 12}},
-    "motion": {"frames": "1-6", "sampling": {"method": "pool", "numParticles": 32, "numCandidates": 512},
-               "camera": camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (6, [0.5, 1.3, 4.6], [0, 0.6, 0]))},
-    "second-pass": {"frames": "1-5", "sampling": {"method": "bidirectional", "numCandidates": 512},
-                    "visibility": {"correlated": True}},
-}
 # That may be lost, come twice or late.
 MESSAGES = ["WorkerHello", "WorkerWelcome", "LeaseRequest", "LeaseGrant", "LeaseRevoke", "Heartbeat", "TaskDone",
             "ReportReceived", "NoWork", "JobDocument"]
 FREQUENT = ["TaskDone", "LeaseGrant", "ReportReceived", "LeaseRequest"]
-
-
-@functools.cache
-def plain_job(folder):
-    """What the kinds of jobs have in common. Its assets are written once: a worker might be reading them."""
-    return make_job(folder)
-
-
-class Job:
-    """One submission of a kind of job."""
-
-    def __init__(self, kind, number, folder):
-        self.kind, self.frames, self.number = kind, folder / "frames" / f"{kind}{number}", number
-        self.path, self._edits = folder / f"{kind}{number}.json", {}
-        self.id, self.is_done = None, False
-        self.written, self.blocked = [], []  # frames, and those in whose place there are folders
-        self._plain = plain_job(folder / "assets")
-        self.write()
-
-    def write(self, **changes):
-        """Writes the job file. changes: of settings, which stay, or of the picture."""
-        changes = {**KINDS[self.kind], "name": f"{self.kind} {self.number}", "output": {"directory": str(self.frames)},
-                   "image": {"tileSize": 16}, "state": {"keep": "last"}, **self._edits, **changes}
-        return write_job(self.path, merged(self._plain, changes))
-
-    def edit(self, **settings):
-        self._edits.update(settings)
-        return self.write()
 
 
 class Chaos(FrameFaults):
@@ -73,7 +40,8 @@ class Chaos(FrameFaults):
                        self.supersede_worker, self.end_worker, self.end_coordinator, self.flip_byte, self.cut_blob,
                        self.remove_blob, self.block_blob, self.remove_frame, self.cut_frame, self.damage_frame,
                        self.block_frame, self.rename_folder, self.lose_token, self.submit_again, self.edit_settings,
-                       self.edit_picture, self.drop_message, self.double_message, self.delay_message]
+                       self.edit_picture, self.drop_message, self.double_message, self.delay_message, self.start_foreign_worker,
+                       self.kill_waiter]
         if disk:
             self.faults += [self.fill_disk, self.make_read_only]
         if power:
@@ -82,6 +50,7 @@ class Chaos(FrameFaults):
 
     def strike(self):
         """One fault that really struck."""
+        deadline = time.monotonic() + STRIKE_S
         while True:
             if not self.deck:
                 self.deck = self.rng.sample(self.faults, len(self.faults))
@@ -89,6 +58,8 @@ class Chaos(FrameFaults):
             if fault():
                 return
             self.deck.insert(self.rng.randrange(len(self.deck) + 1), fault)
+            check(time.monotonic() < deadline,
+                  f"nothing has struck for {STRIKE_S} s, not even {', '.join(card.__name__ for card in self.deck)}")
             time.sleep(0.02)
             self.tend()
             self.renew()
@@ -114,8 +85,8 @@ class Chaos(FrameFaults):
         number = len(self.jobs) // len(KINDS) + 1
         for kind in KINDS:
             job = Job(kind, number, self.farm.folder)
-            job.id = self.farm.submit(job.path)
             self.jobs.append(job)
+            check(self.submit(job) == OK, f"{job.path.stem} is refused")
 
     # ---- faults: each returns whether it struck ------------------------------------------------------------
 
@@ -189,22 +160,24 @@ class Chaos(FrameFaults):
         return job is not None and self.submit(job) == OK and self.count("submitted again")
 
     def edit_settings(self):
-        """Another size of tiles and another priority make no other picture."""
+        """What makes no other picture, one after the other: tiles and priority, names of files, fewer and more frames, AOVs,
+        more sweeps."""
         job = self.some_job()
         if job is None:
             return False
-        before = job.id
-        job.edit(image={"tileSize": self.rng.choice([16, 32, 48])}, priority=self.rng.randrange(100))
+        before, edits = job.id, dict(job.edits)
+        what, settings = self.rng.choice(edits_of(job, self.rng))
+        job.edit(**settings)
         if self.submit(job) != OK:
+            job.undo(edits)
             return False
-        if job.id != before:
-            self.ended_jobs.add(before)
-        return self.count("settings edited")
+        check(job.id == before, f"{job.path.stem} has another ID after its {what} changed")
+        return self.count(f"{what} edited")
 
     def edit_picture(self):
         """Another picture is refused, and changes nothing."""
         job = self.some_job()
-        if job is None or not list(job.frames.glob("*.exr")):
+        if job is None or not any(job.frame(number).exists() for number in job.numbers()):
             return False
         job.write(seed=self.rng.randrange(100, 1000))
         answer = self.farm.baton("job", "submit", job.path, expect=None)
@@ -214,6 +187,34 @@ class Chaos(FrameFaults):
         check(answer.returncode == BAD_INPUT and "$.seed" in answer.stderr,
               f"another picture in the folder of {job.path.stem}: {answer.stdout}{answer.stderr}")
         return self.count("picture edited")
+
+    def start_foreign_worker(self):
+        """A worker that renders with another instruction set is refused while others are there; where none is, it must not
+        go on with what they have begun."""
+        if not self.farm.coordinator.alive() or self.is_frozen(self.farm.coordinator):
+            return False
+        self.num_started += 1
+        worker = self.farm.start_worker(name=f"foreign-{self.num_started}", extra=["--isa", FOREIGN_ISA])
+        deadline = time.monotonic() + FOREIGN_S
+        while worker.alive() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        is_refused = not worker.alive()
+        if worker.alive():
+            self.signal(worker.pid, signal.SIGKILL)
+            wait_until(lambda: not worker.alive(), "the foreign worker has ended")
+        return self.count("foreign worker refused" if is_refused else "foreign worker killed")
+
+    def kill_waiter(self):
+        """Who waits for a job has no part in it."""
+        job = self.some_job()
+        if job is None:
+            return False
+        waiter = subprocess.Popen([self.farm.programs.path("baton"), "job", "wait", job.id, "--coordinator", self.farm.endpoint],
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(self.rng.uniform(0.1, 1))
+        waiter.kill()
+        waiter.wait()
+        return self.count("waiter killed")
 
     def drop_message(self):
         return self.harm_message("drop", "message dropped")
@@ -243,7 +244,8 @@ class Chaos(FrameFaults):
         for process in processes:
             self.signal(process.pid, signal.SIGKILL)
         wait_until(lambda: not any(process.alive() for process in processes), "all processes have ended")
-        at_rest = {job.id for job in self.jobs if job.kind == "rest"}  # whose states are all checkpoints
+        # Their states are all checkpoints.
+        at_rest = {version for job in self.jobs if job.kind == "rest" for version in job.versions}
         promised = {output.split(":")[2]: seen.ms
                     for seen in self.proxy.seen() if seen.type == "TaskDone" and seen.task[0] in at_rest
                     for output in seen.outputs if output.startswith(f"{STATE}:")}
@@ -274,6 +276,9 @@ class Chaos(FrameFaults):
                 job.is_done = status == "done"
                 if status == "paused" and job.blocked:
                     self.mend(job)
+                if status == "running" and "renders as what is done was rendered" in shown.get("waits", ""):
+                    # A foreign worker was alone, and has begun it.
+                    self.farm.baton("job", "submit", job.path, "--restart", expect=None)
             if not job.is_done:
                 left.append(job)
         return left
@@ -286,7 +291,12 @@ class Chaos(FrameFaults):
         answer = self.farm.baton("job", "submit", job.path, "--json", expect=None)
         job.is_done = False
         if answer.returncode == OK:
-            job.id = json.loads(answer.stdout)["id"]
+            accepted = json.loads(answer.stdout)
+            job.id = accepted["id"]
+            if accepted["version"] not in job.versions[-1:]:
+                self.ended_jobs.update(job.versions)
+                self.ended_jobs.discard(accepted["version"])
+                job.versions.append(accepted["version"])
         return answer.returncode
 
     def is_frozen(self, process):

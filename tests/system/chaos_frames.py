@@ -73,7 +73,7 @@ class FrameFaults:
         for job in self.rng.sample(self.jobs, len(self.jobs)):
             shown = None if job.is_done else self.show(job)
             if shown and shown["status"] == "running" and 0 < shown["framesDone"] <= shown["framesTotal"] - 2:
-                job.written = [job.frames / f"frame.{number:04d}.exr" for number in shown["framesDoneNumbers"]]
+                job.written = [job.frame(number) for number in shown["framesDoneNumbers"]]
                 return job
         return None
 

@@ -7,7 +7,7 @@ import re
 import shutil
 import time
 
-from farm import IO, OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
+from farm import BAD_INPUT, IO, OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
 
 FRAMES = 8
@@ -26,10 +26,10 @@ def frame(folder, number):
     return folder / f"frames/frame.{number:04d}.exr"
 
 
-def begin(farm, folder, num_done=2):
+def begin(farm, folder, num_done=2, make_job_file=make):
     """Submits the job and has its first frames made, then nobody works. Returns its ID."""
     worker = farm.start_worker()
-    ident = farm.submit(make(folder))
+    ident = farm.submit(make_job_file(folder))
     wait_until(lambda: farm.show(ident)["framesDone"] >= num_done, "frames are done")
     worker.terminate()
     worker.wait()
@@ -244,6 +244,62 @@ def an_output_folder_that_cannot_be_made_is_refused(programs, folder):
                 path.write_text(json.dumps(job), encoding="utf-8")
             check_says(farm.baton("job", "submit", path, expect=IO).stderr, "the output folder cannot be made")
         check_equal(json.loads(farm.baton("job", "list", "--all", "--json").stdout)["jobs"], [], "jobs")
+
+
+def a_locked_frame_outlives_everything(programs, folder):
+    """An edited frame stays through its own job's end, --restart with another picture, other sweeps, more frames and other
+    names, and the death of the coordinator; a locked frame that is gone is told of."""
+    def make_loose(place, **changes):
+        return make(place, **{"state": {"carry": False}, **changes})
+
+    other = folder / "other"
+    programs.render(make_loose(other, seed=77), other / "work", threads=2)
+    painted = frame(other, 2).read_bytes()
+    with Farm(programs, folder / "farm") as farm:
+        ident = begin(farm, folder, make_job_file=make_loose)
+        frame(folder, 2).write_bytes(painted)
+        check_says(finish(farm, ident, expect=IO).stdout, f"`baton job lock {ident[:8]} --frames 2` keeps it for good")
+        check_says(farm.baton("job", "lock", ident, "--frames", "2").stderr, "frames 2 are locked", f"baton job retry {ident[:8]}")
+        farm.baton("job", "retry", ident)
+        farm.wait_for(ident)
+        check_says(farm.baton("job", "show", ident).stdout, "locked     2\n")
+
+        def goes_on(*extra, says="frame 2 is locked and stays as it is", at=2, **changes):
+            said = farm.baton("job", "submit", make_loose(folder, **changes), "--json", *extra)
+            answer = json.loads(said.stdout)
+            check_says(answer["plan"], says)
+            check_equal(answer["id"], ident, "ID")
+            farm.wait_for(ident)
+            check_equal(frame(folder, at).read_bytes(), painted, f"the edited frame after {extra} {changes}")
+            check_equal(farm.show(ident)["locked"], [2], "locked frames")
+
+        goes_on(quality={"sweeps": 2})
+        farm.coordinator.kill()
+        farm.start_coordinator()
+        goes_on(quality={"sweeps": 2}, frames=f"1-{FRAMES + 2}", says="frames 1-8 are kept")
+        goes_on("--restart", seed=5)
+        goes_on("--from-frame", "2", seed=6)
+        witness = folder / "witness"
+        programs.render(make_loose(witness, seed=6), witness / "work", threads=2)
+        expected = programs.pixels(witness / "frames")
+        got = programs.pixels(folder / "frames")
+        check_equal([got[f"frame.{n:04d}.exr"] for n in range(3, FRAMES + 1)],
+                    [expected[f"frame.{n:04d}.exr"] for n in range(3, FRAMES + 1)], "pixels of the others")
+
+        # Under another name the locked frame is not there.
+        renamed = {"output": {"pattern": "beauty.####.exr"}}
+        words = ["beauty.0002.exr is locked and not there", f"baton job lock {ident[:8]} --off --frames 2"]
+        check_says(farm.baton("job", "submit", make_loose(folder, seed=6, **renamed), "--restart", expect=IO).stderr, *words)
+        (folder / "frames/beauty.0002.exr").write_bytes(painted)
+        goes_on(seed=6, frames=f"2-{FRAMES}", **renamed)
+        check_equal((folder / "frames/beauty.0002.exr").read_bytes(), painted, "the edited frame under its new name")
+
+        # Refused, and unlocked.
+        for words, says in [(["--frames", "99"], "it has no frames 99"), (["--frames", "3", "--off"], "frames 3 are not locked")]:
+            check_says(farm.baton("job", "lock", ident, *words, expect=BAD_INPUT).stderr, says)
+        farm.baton("job", "lock", ident, "--frames", "2", "--off")
+        check_says(farm.baton("job", "submit", make_loose(folder, seed=6, frames=f"2-{FRAMES}", **renamed), expect=IO).stderr,
+                   "beauty.0002.exr is not what a job has written")
 
 
 if __name__ == "__main__":

@@ -121,24 +121,31 @@ def render_adds_sweeps(programs, folder):
     check("2 rounds: noise" in told and "more" not in told, told)
 
 
-def waiting_adds_sweeps(programs, folder):
-    """A job that was submitted grows while somebody waits for it, as `baton render` would have it."""
+def the_farm_adds_sweeps(programs, folder):
+    """A job that was submitted grows, whether or not somebody waits for it, as `baton render` would have it: nobody opens a
+    frame for that."""
     quality = {"rounds": 4, "noiseThreshold": 0.02, "maxRounds": 64}
     expected = programs.rendered(folder / "rendered", turning(folder / "rendered", **quality))
     path = write_job(folder / "farm/job.json", turning(folder / "farm", **quality))
     with Farm(programs, folder / "work", workers=1) as farm:
         said = farm.baton("job", "submit", path)
-        check("baton job wait adds rounds until quality.noiseThreshold ends it" in said.stderr, said.stderr)
-        farm.wait_for(said.stdout.strip())
+        check("rounds are added until quality.noiseThreshold ends it" in said.stderr, said.stderr)
+        ident = said.stdout.strip()
+        wait_until(lambda: farm.show(ident)["status"] == "done", "it is done, and nobody has waited")
         check_equal(programs.pixels(folder / "farm/frames"), expected, "pixels beside those of render")
-        told = farm.baton("job", "wait", said.stdout.strip()).stderr
+        told = farm.baton("job", "wait", ident).stderr
         check("rounds: noise" in told and "more" not in told, told)
+        growth = farm.show(ident)["growth"]
+        check(len(growth) > 1 and all(line.endswith("more") for line in growth[:-1]), growth)
 
-        # Frames that cannot be read tell no noise.
-        for frame in (folder / "farm/frames").glob("*.exr"):
-            frame.unlink()
-        told = farm.baton("job", "wait", said.stdout.strip()).stderr
-        check("no frame tells its noise here: no more rounds" in told, told)
+        # The same document again has nothing to add, and a lower threshold some more.
+        check_equal(farm.submit(path), ident, "ID")
+        farm.wait_for(ident)
+        check_equal(farm.show(ident)["growth"], growth[-1:], "rounds that the same job adds")
+        write_job(path, turning(folder / "farm", **{**quality, "noiseThreshold": 0.001}))
+        check_equal(farm.submit(path), ident, "ID")
+        farm.wait_for(ident)
+        check(farm.show(ident)["growth"][-1].startswith("64 rounds: noise"), farm.show(ident)["growth"])
 
 
 def frames_of_several_sweeps_are_those_of_the_job(programs, folder):
@@ -156,8 +163,8 @@ def frames_of_several_sweeps_are_those_of_the_job(programs, folder):
     check_equal(programs.pixels(folder / "frames"), expected, "pixels of all frames anew")
 
 
-def a_wait_that_is_repeated_adds_no_more(programs, folder):
-    """Killed whenever it has added rounds, and asked again with the ID that was printed first: the same rounds in the end."""
+def a_growing_job_outlives_those_who_wait_and_the_coordinator(programs, folder):
+    """Waiters and coordinators are killed whenever rounds were added: the same rounds in the end."""
     quality = {"rounds": 4, "noiseThreshold": 0.02, "maxRounds": 64}
     expected = programs.rendered(folder / "rendered", turning(folder / "rendered", **quality))
     path = write_job(folder / "farm/job.json", turning(folder / "farm", **quality))
@@ -165,17 +172,16 @@ def a_wait_that_is_repeated_adds_no_more(programs, folder):
         ident = farm.submit(path)
         command = [programs.path("baton"), "job", "wait", ident, "--coordinator", farm.endpoint]
         kills = 0
-        for attempt in range(20):
-            waiting = Process(command, folder / f"wait{attempt}.log")
-            wait_until(lambda: "more\n" in waiting.log() or not waiting.alive(), "it adds rounds or ends")
-            if not waiting.alive():
-                break
+        while (shown := farm.show(ident))["status"] == "running":
+            waiting = Process(command, folder / f"wait{kills}.log")
+            grown = len(shown.get("growth", []))
+            wait_until(lambda: len(farm.show(ident).get("growth", [])) > grown or not waiting.alive(), "it grows or ends")
             waiting.kill()
+            farm.coordinator.kill()
+            farm.start_coordinator()
             kills += 1
-        check(kills > 0, "it was never killed")
-        farm.wait_for(ident)
-        shown = farm.show(ident)
-        check_equal((shown["id"], shown["status"]), (ident, "done"), "the job")
+        check(kills > 1, "nobody was ever killed")
+        check_equal((farm.show(ident)["id"], farm.show(ident)["status"]), (ident, "done"), "the job")
     check_equal(programs.pixels(folder / "farm/frames"), expected, "pixels beside those of render")
 
 

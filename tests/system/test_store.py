@@ -3,7 +3,7 @@
 
 
 from disk_use import StoreWatch, measure
-from farm import FAILED, check, check_equal, run_tests
+from farm import IO, check, check_equal, run_tests
 from jobs import camera_keys, make_job, write_job
 
 MIB = 1 << 20
@@ -48,7 +48,7 @@ def a_limit_holds_and_the_job_ends(programs, folder):
 
 def a_limit_that_is_too_low_ends_the_render_with_an_error(programs, folder):
     path = job_in(folder)
-    done = programs.render(path, folder / "work", extra=["--store-limit", 1], expect=FAILED)
+    done = programs.render(path, folder / "work", extra=["--store-limit", 1], expect=IO)
     check("stopped: the job waits for room in the store" in done.stderr, done.stderr)
     check("of the 1.0 MiB that --store-limit allows" in done.stderr, done.stderr)
     programs.render(path, folder / "work", extra=["--store-limit", 1000])

@@ -11,7 +11,11 @@ Result<MapCache::MapPtr> MapCache::get(const std::string& path, const Environmen
                 hidden, capped_share};
   const std::lock_guard lock(reading_);
   if (MapPtr found = maps_.find(key)) return found;
-  BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
+  Result<RgbImage> read = read_rgb_image(path);
+  // Its reader may take an error of the moment for a broken file.
+  if (!read && read.error().kind == ErrorKind::bad_input) read = read_rgb_image(path);
+  BATON_ASSIGN(const RgbImage image, std::move(read));
+  BATON_TRY(is_unchanged_(path));
   reports_.insert_or_assign({path, environment.scale},
                             report_map(path, image, environment.scale, environment.max_width));
   return maps_.insert(key, std::make_shared<const EnvironmentMap>(

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -15,8 +16,7 @@
 namespace baton {
 
 /// Maps of files, as large as jobs want them, with sampling tables, kept while memory allows. Any
-/// number of threads and jobs may ask; a map is read once while the others wait. Files are taken to
-/// keep their contents as long as the cache lives.
+/// number of threads and jobs may ask; a map is read once while the others wait.
 class MapCache {
  public:
   using MapPtr = std::shared_ptr<const EnvironmentMap>;
@@ -24,8 +24,13 @@ class MapCache {
   explicit MapCache(const MemorySharePtr& share)
       : maps_(share, [](const EnvironmentMap& map) { return map.size_bytes(); }) {}
 
+  /// is_unchanged: asked of each file once it is read: an error says that it is not the one that is
+  /// meant. Before the first get().
+  void check_with(std::function<Status(const std::string& path)> is_unchanged) {
+    is_unchanged_ = std::move(is_unchanged);
+  }
   /// The map of a file with the size and table that `environment` and the other arguments, those
-  /// of EnvironmentMap, ask for. Error: a map that cannot be read.
+  /// of EnvironmentMap, ask for. Error: a map that cannot be read, or has changed.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
                      const HiddenCone& hidden = {}, float capped_share = 0);
   /// What is known of a map that was got with this scale; nothing of a map that was not.
@@ -44,6 +49,9 @@ class MapCache {
     auto operator<=>(const Key&) const = default;
   };
 
+  std::function<Status(const std::string& path)> is_unchanged_ = [](const auto&) {
+    return Status();
+  };
   mutable std::mutex reading_;
   LruCache<Key, EnvironmentMap> maps_;
   std::map<std::pair<std::string, float>, MapReport> reports_;  ///< by path and scale

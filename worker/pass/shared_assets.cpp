@@ -33,6 +33,12 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
   return load_shared_assets(job, memory, memory.scene_bytes);
 }
 
+Status verify_asset(const std::vector<AssetDigest>& files, const std::string& path) {
+  const auto found =
+      std::ranges::find_if(files, [&](const AssetDigest& file) { return file.path == path; });
+  return found == files.end() ? Status() : verify_assets({*found});
+}
+
 Result<std::shared_ptr<const SharedAssets>> AssetShelf::get(const JobSpec& job,
                                                             const std::vector<AssetDigest>& files,
                                                             const MemoryBudget& memory,
@@ -45,6 +51,7 @@ Result<std::shared_ptr<const SharedAssets>> AssetShelf::get(const JobSpec& job,
     if (assets != nullptr && entry.scene == job.scene && entry.files == files) return assets;
   }
   BATON_ASSIGN(auto assets, load_shared_assets(job, memory, max_scene_bytes));
+  assets->maps->check_with([files](const std::string& path) { return verify_asset(files, path); });
   entries_.push_front({job.scene, files, assets});
   return assets;
 }

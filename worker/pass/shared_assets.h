@@ -35,6 +35,10 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
 /// The same with what is usual on this machine.
 Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job);
 
+/// A file that has been read is the one that the job was submitted with. files: with their digests;
+/// one that is not among them may be any. Errors: those of verify_assets().
+Status verify_asset(const std::vector<AssetDigest>& files, const std::string& path);
+
 /// The assets of those jobs that are still in use. Any number of threads may ask; one loads at a
 /// time.
 class AssetShelf {

@@ -11,6 +11,7 @@
 #include "worker/exchange/second_pass.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/render_context.h"
+#include "worker/pass/shared_assets.h"
 #include "worker/run/frame_output.h"
 
 namespace baton {
@@ -48,7 +49,7 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
     }
     StatePtr state = loaded.states->find(input);
     if (state == nullptr && input.is_held())
-      return Error{ErrorKind::io, fmt::format("{}: is not held here", blob_name(input))};
+      return Error{ErrorKind::corrupt, fmt::format("{}: is not held here", blob_name(input))};
     if (state == nullptr) {
       BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
       BATON_ASSIGN(SampleState decoded,
@@ -237,6 +238,7 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const BlobStore& st
   if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
     const FrameNumber number = here.frames[frame.index()];
     BATON_ASSIGN(Plate plate, load_plate(here, number));
+    BATON_TRY(verify_asset(loaded.assets, file_at(*here.output.plate, number)));
     notes = plate_notes(file_at(*here.output.plate, number), plate);
     plate_image = std::move(plate.picture);
   }

@@ -136,7 +136,7 @@ Status paste_tile(const FilmTile& tile, FilmTile& image) {
 }
 
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, FrameNumber frame,
-                             const FrameQuality& quality, float cycles_noise) {
+                             const FrameQuality& quality) {
   ImageMetadata metadata{{"baton:version", kVersion},
                          {"baton:jobName", job.name},
                          {"baton:jobDigest", job_digest.hex()},
@@ -170,8 +170,8 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
     metadata.emplace_back("baton:noise", fmt::format("{:.4g}", quality.noise));
     add("baton:noiseFrom", noise_source_name(quality.noise_source));
   }
-  if (cycles_noise > 0)
-    metadata.emplace_back("baton:cyclesNoise", fmt::format("{:.4g}", cycles_noise));
+  if (quality.cycles_noise > 0)
+    metadata.emplace_back("baton:cyclesNoise", fmt::format("{:.4g}", quality.cycles_noise));
   add("baton:pixelsBelowZero", quality.pixels_below_zero);
   add("baton:clampNegative", quality.clamped);
   if (quality.pixels_not_finite > 0) add("baton:pixelsNotFinite", quality.pixels_not_finite);
@@ -193,12 +193,10 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
                                  FilmTile image, const std::optional<RgbImage>& plate,
                                  const std::function<Status()>& may_appear) {
   FrameQuality quality = judge_frame(image);
-  float noise = cycles_noise(image);
   if (job.output.clamp_negative) clamp_negative(image);
   if (plate) {
     lay_over_plate(image, *plate);
     quality = judge_composite(image, quality);
-    noise = cycles_noise(image);
   }
   quality.clamped = job.output.clamp_negative;
   drop_channel(image, kErrorChannel);
@@ -218,7 +216,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
                           {.half_float = job.output.pixel_type == PixelType::half_float,
                            .whole = whole_channels(job, quality),
                            .compression = job.output.compression,
-                           .metadata = frame_metadata(job, job_digest, number, quality, noise),
+                           .metadata = frame_metadata(job, job_digest, number, quality),
                            .world_to_camera = camera.world_to_camera(),
                            .world_to_ndc = camera.world_to_ndc(job.image.whole()),
                            .frames_per_second = job.output.frames_per_second,

@@ -50,8 +50,8 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
 Status verify_frame(const std::filesystem::path& path, const FilmTile& image, std::int32_t block);
 
 /// The header attributes that Baton adds to its images: what they are made from, what was seen of
-/// them, and the job's own metadata as baton:metadata:NAME. cycles_noise: 0 where it is not told.
+/// them, and the job's own metadata as baton:metadata:NAME.
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, FrameNumber frame,
-                             const FrameQuality& quality, float cycles_noise = 0);
+                             const FrameQuality& quality);
 
 }  // namespace baton

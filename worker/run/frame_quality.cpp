@@ -45,6 +45,7 @@ FrameQuality judge_frame(const FilmTile& image) {
   const FilmColors colors(image);
   if (!colors) return quality;
   judge_values(colors, quality);
+  quality.cycles_noise = cycles_noise(image);
   if (const FrameNoise noise = noise_of_film(image); noise.is_told()) {
     quality.noise = noise.relative();
     quality.noise_error = noise.error_share();

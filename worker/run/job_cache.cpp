@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "common/base/file_stamp.h"
 #include "common/base/limits.h"
 #include "common/job/plan/estimate.h"
 #include "common/job/text/job_json.h"
@@ -33,6 +34,16 @@ std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
       has_plate(job.output) ? std::int64_t{12} * job.image.width * job.image.height : 0;
   return static_cast<std::uint64_t>(num_threads * tile_bytes + e.film_bytes + e.frame_bytes +
                                     plate_bytes);
+}
+
+/// How files stand; nullopt: one is not there, or cannot be looked at now.
+std::vector<std::optional<FileStamp>> stamps_of(const std::vector<AssetDigest>& files) {
+  std::vector<std::optional<FileStamp>> stamps;
+  for (const AssetDigest& file : files) {
+    const Result<std::optional<FileStamp>> stamp = stamp_of(file.path);
+    stamps.push_back(stamp ? *stamp : std::nullopt);
+  }
+  return stamps;
 }
 
 /// What the worker's memory leaves to the job's scene. Error: nothing.
@@ -74,12 +85,22 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
     return LoadedJobPtr(std::move(loaded));
   }
 
+  // What changes while it is read is looked at again, and then told of.
+  const std::vector<std::optional<FileStamp>> before = stamps_of(here.assets);
   BATON_TRY(verify_assets(here.assets));
   BATON_ASSIGN(const std::uint64_t room, room_for_scene(here.job, machine));
-  BATON_ASSIGN(const auto assets, shelf.get(here.job, here.assets, machine.memory, room));
+  auto loading = shelf.get(here.job, here.assets, machine.memory, room);
+  // Readers take an error of the moment for a broken file.
+  if (!loading && loading.error().kind == ErrorKind::bad_input)
+    loading = shelf.get(here.job, here.assets, machine.memory, room);
+  BATON_ASSIGN(const auto assets, std::move(loading));
+  if (stamps_of(here.assets) != before)
+    return Error{ErrorKind::io,
+                 "the files of job '" + here.job.name + "' change while they are read"};
   BATON_ASSIGN(loaded->context,
                make_render_context(here.job, parsed.picture, assets, machine.memory));
   loaded->scene_bytes = assets->size_bytes();
+  loaded->assets = here.assets;
   return LoadedJobPtr(std::move(loaded));
 }
 

@@ -36,6 +36,8 @@ struct LoadedJob {
   /// What this machine does not see of the job, a line; then nothing of it is loaded.
   std::string unseen = {};
   std::string token = {};  ///< JobDocument::token
+  /// Files that the job reads, where this machine has them.
+  std::vector<AssetDigest> assets = {};
 };
 
 using LoadedJobPtr = std::shared_ptr<const LoadedJob>;

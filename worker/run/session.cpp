@@ -238,10 +238,11 @@ void Session::receive(const Shutdown&, TimePoint, Actions& actions) {
 }
 
 void Session::receive(const Refused& refused, TimePoint, Actions& actions) {
-  // Another version, or a key that is not that of a worker, will not change its mind; anything else
-  // is worth a line in the log.
+  // Another version, or a key that is not that of a worker, will not change its mind; a farm that
+  // is full needs the connection; anything else is worth a line in the log.
   const auto kind = static_cast<ErrorKind>(refused.kind);
-  if (kind == ErrorKind::version || kind == ErrorKind::usage) {
+  const bool is_full = kind == ErrorKind::io && !welcomed_ && in_hand_.empty() && reports_.empty();
+  if (kind == ErrorKind::version || kind == ErrorKind::usage || is_full) {
     actions.push_back(Leave{exit_code_of(kind), refused.message});
   } else {
     actions.push_back(Warn{"the coordinator says: " + refused.message});

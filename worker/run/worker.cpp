@@ -7,14 +7,17 @@
 #include <array>
 #include <future>
 #include <list>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <random>
 #include <set>
 #include <span>
+#include <thread>
 
 #include "common/base/build.h"
 #include "common/base/files.h"
+#include "common/base/limits.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/job_json.h"
 #include "common/math/instruction_set.h"
@@ -103,6 +106,22 @@ class NoteLog {
 /// included.
 constexpr std::chrono::minutes kLoadPatience{15};
 
+/// A disk may be away for a moment, and a blob that another machine has written be seen here later:
+/// the task is begun again for a second and a half.
+Result<TaskResult> execute_patiently(const LoadedJob& loaded, const QueuedTask& task,
+                                     const std::stop_token& stop, std::vector<BlobRef>& left) {
+  constexpr int kAttempts = 6;
+  std::chrono::milliseconds pause{50};
+  for (int attempt = 1;; ++attempt, pause *= 2) {
+    left.clear();
+    Result<TaskResult> result = execute_task(loaded, *task.store, task.grant, stop, &left);
+    const bool may_pass = !result && result.error().kind == ErrorKind::io;
+    if (!may_pass || attempt == kAttempts || stop.stop_requested()) return result;
+    if (attempt == 1) spdlog::warn("waits for {}", result.error().message);
+    std::this_thread::sleep_for(pause);
+  }
+}
+
 /// Executes a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
 Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token& stop,
@@ -131,7 +150,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
       notes.report(loaded->digest, {seen.error().message});
       return TaskResult{.made = {}, .unseen = seen.error().message};
     }
-    Result<TaskResult> frame = execute_task(*loaded, *task.store, task.grant, stop);
+    Result<TaskResult> frame = execute_patiently(*loaded, task, stop, left);
     if (const Status seen = expect_output_folder(*loaded); !frame && !seen)
       return TaskResult{.made = {}, .unseen = seen.error().message};
     if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
@@ -147,7 +166,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
     command = replay_command(path, numbers[last.index()], key.tile);
   }
   const CrashNote note(command);
-  Result<TaskResult> output = execute_task(*loaded, *task.store, task.grant, stop, &left);
+  Result<TaskResult> output = execute_patiently(*loaded, task, stop, left);
   if (output) output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
@@ -185,8 +204,7 @@ std::vector<StatesPublished> pack_held(const std::vector<std::pair<Digest, JobSt
     if (published) {
       messages.push_back({job, std::move(published).value()});
     } else {
-      spdlog::warn("job {}: states stay unpublished: {}", job.short_hex(),
-                   published.error().message);
+      spdlog::warn("states stay unpublished: {}", published.error().message);
     }
   }
   return messages;
@@ -347,13 +365,22 @@ class Worker {
   }
   void perform(StopTask& action) { threads_.stop(action.lease); }
   void perform(DropQueuedTasks&) { threads_.drop_queued(); }
-  void perform(TakeDocument& action) { jobs_.entry(action.document.job)->provide(action.document); }
+  void perform(TakeDocument& action) {
+    if (names_.size() >= limits::kMaxJobs) names_.clear();
+    names_[action.document.job] = action.document.id.short_hex();
+    jobs_.entry(action.document.job)->provide(action.document);
+  }
   void perform(Warn& action) { spdlog::warn("{}", action.message); }
   void perform(Leave& action) { leave_ = std::move(action); }
 
-  static void log_failure(const TaskEnded& ended) {
+  /// The ID of a job, for people; as long as its document has not come, what is known of that.
+  std::string name_of(const Digest& job) const {
+    const auto found = names_.find(job);
+    return found == names_.end() ? job.short_hex() : found->second;
+  }
+  void log_failure(const TaskEnded& ended) const {
     if (ended.result || ended.result.error().kind == ErrorKind::cancelled) return;
-    spdlog::error("job {} {} step {} tile {} failed: {}", ended.lease.job.short_hex(),
+    spdlog::error("job {} {} step {} tile {} failed: {}", name_of(ended.lease.job),
                   task_name(ended.lease.task.kind), ended.lease.task.position,
                   ended.lease.task.tile, ended.result.error().message);
   }
@@ -363,6 +390,7 @@ class Worker {
   const Machine machine_;
   AssetShelf shelf_;  ///< what jobs_ loads from
   JobCache jobs_;
+  std::map<Digest, std::string> names_;  ///< of jobs whose document has come
   std::shared_ptr<BlobStore> store_;
   std::filesystem::path store_directory_;
   std::optional<Leave> leave_;

@@ -163,6 +163,12 @@ Result<std::string> make_job_document(const JobSpec& job) {
   return write(std::move(document), -1);
 }
 
+std::string with_sweeps(ParsedJobDocument document, int sweeps) {
+  document.job.quality.sweeps = sweeps;
+  document.job.quality.refinable = true;
+  return write(std::move(document), -1);
+}
+
 Result<ParsedJobDocument> parse_job_document(std::string_view text) {
   BATON_ASSIGN(ParsedJobDocument document, read<ParsedJobDocument>(text, "job document", "/"));
   if (document.job.sampling.method == Method::automatic) {

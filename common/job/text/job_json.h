@@ -69,6 +69,10 @@ struct ParsedJobDocument {
   Digest digest;   ///< digest_of(text): the identity of the job
   Digest picture;  ///< picture_digest of it (picture.h)
 };
+/// The text of a document with so many sweeps, which stay for more; its files keep the digests that
+/// they have in it.
+std::string with_sweeps(ParsedJobDocument document, int sweeps);
+
 Result<ParsedJobDocument> parse_job_document(std::string_view text);
 
 /// Checks that every asset still has the digest it had at submission. The error names each file

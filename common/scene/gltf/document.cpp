@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 
+#include "common/base/file_stamp.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/job/text/job_json_text.h"
@@ -212,9 +213,8 @@ Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std
 }
 
 Result<std::shared_ptr<const Document>> read_document(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error))
-    return Error{ErrorKind::bad_input, path + ": missing: expected a glTF file"};
+  BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
+  if (!stamp) return Error{ErrorKind::bad_input, path + ": missing: expected a glTF file"};
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
   return parse_document(bytes, path);
 }

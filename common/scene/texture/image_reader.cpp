@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/base/file_stamp.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/image/exr_image.h"
@@ -144,9 +145,8 @@ Result<Image> read_exr_texture(const std::string& path) {
 }  // namespace
 
 Result<Image> read_image(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error))
-    return bad_image(path, "missing: expected an image file");
+  BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
+  if (!stamp) return bad_image(path, "missing: expected an image file");
   const FirstBytes start = first_bytes(path);
   if (is_exr(start)) return read_exr_texture(path);
   if (!is_jpeg(start)) return read(path, std::nullopt, path);

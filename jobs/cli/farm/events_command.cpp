@@ -59,6 +59,21 @@ void print_events(const std::vector<FarmEvent>& events, bool json) {
   std::fflush(stdout);
 }
 
+/// What the job has from before its oldest event that is still there.
+void print_forgotten(const std::vector<ForgottenEvents>& forgotten, bool json) {
+  for (const ForgottenEvents& sum : forgotten) {
+    if (json) {
+      fmt::print("{}\n", ordered_json{{"kind", farm_event_name(sum.kind)},
+                                      {"forgotten", sum.count},
+                                      {"seconds", sum.seconds}}
+                             .dump());
+    } else {
+      fmt::print("before              {:<19}  {} times{}\n", farm_event_name(sum.kind), sum.count,
+                 sum.seconds > 0 ? fmt::format(", {:.1f} s together", sum.seconds) : "");
+    }
+  }
+}
+
 /// What has happened, and with --follow what happens until the coordinator ends.
 Result<ExitCode> show_events(const EventsOptions& options) {
   BATON_ASSIGN(RequestClient client, options.link.connect());
@@ -67,6 +82,7 @@ Result<ExitCode> show_events(const EventsOptions& options) {
     BATON_ASSIGN(question.query.since_ms, parse_since(options.since, now_ms()));
   }
   BATON_ASSIGN(EventList found, ask<EventList>(client, question));
+  print_forgotten(found.forgotten, options.json);
   print_events(found.events, options.json);
   question.query.is_newest = false;
   question.query.count = limits::kMaxEventsTold;

@@ -123,7 +123,7 @@ Result<ExitCode> work(RenderSession& session, const RenderOptions& options,
     tend_pilots();
     return false;
   }));
-  if (status) return is_open(*status) ? ExitCode::failed : exit_code_of(*status);
+  if (status) return exit_code_of_stopped(*status);
   fmt::print(stderr, "stopped; the same command goes on\n");
   return ExitCode::cancelled;
 }

@@ -15,7 +15,6 @@
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/settle_method.h"
-#include "jobs/cli/sweeps.h"
 
 namespace baton {
 namespace {
@@ -37,6 +36,8 @@ struct JobOptions {
   bool all = false;                       ///< list
   bool is_long = false;                   ///< list
   bool all_ended = false;                 ///< delete
+  std::string frames;                     ///< lock
+  bool off = false;                       ///< lock
   bool json = false;
 };
 
@@ -61,7 +62,6 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
   BATON_TRY(settle_method_at(job, options.link));
   const bool restart = options.restart || options.from_frame || wanted.is_look;
-  begin_sweeps(job, restart);
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
                ask_until_done<JobAccepted>(client, SubmitJob{std::move(document), restart}));
@@ -69,7 +69,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   if (options.json) return ExitCode::ok;
   if (wanted.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
   if (job.quality.may_grow())
-    fmt::print(stderr, "baton job wait adds rounds until quality.{} ends it\n",
+    fmt::print(stderr, "rounds are added until quality.{} ends it\n",
                job.quality.noise_threshold ? "noiseThreshold"
                : job.quality.time_limit    ? "timeLimit"
                                            : "maxRounds");
@@ -105,6 +105,8 @@ void print_detail(const ShownJob& job, bool json) {
   fmt::print("{}", times_text(job.identity.times));
   if (job.identity.version > 1) fmt::print("version    {}\n", job.identity.version);
   if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
+  if (!job.identity.locked.empty())
+    fmt::print("locked     {}\n", format_frames(job.identity.locked));
   fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
   if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
   for (const std::string& note : detail.notes) fmt::print("warning    {}\n", note);
@@ -117,35 +119,14 @@ Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
   return ExitCode::ok;
 }
 
-/// A job that is waited for, with the sweeps that it gets meanwhile.
-class GrowingJob {
- public:
-  /// After the job is done: whether it gets more sweeps. False: there are enough, or only its owner
-  /// may add some. After an error `timeout` it can be asked again.
-  Result<bool> grow(const Digest& version, RequestClient& client) {
-    if (!more_) {
-      const Result<JobDocument> document = ask<JobDocument>(client, JobDocumentRequest{version});
-      if (!document && document.error().kind == ErrorKind::usage) return false;
-      if (!document) return document.error();
-      BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document->json));
-      spec_ = std::move(parsed.job);
-      more_.emplace(spec_, false);
-    }
-    if (next_.empty()) {
-      if (!more_->add_to(spec_)) return false;
-      BATON_ASSIGN(next_, make_job_document(spec_));
-    }
-    BATON_ASSIGN(const JobAccepted accepted, ask<JobAccepted>(client, SubmitJob{next_}));
-    next_.clear();
-    fmt::print(stderr, "{}", accepted.plan);
-    return true;
-  }
-
- private:
-  JobSpec spec_;
-  std::string next_;  ///< its document, until it is accepted
-  std::optional<MoreSweeps> more_;
-};
+/// What a growing job has decided since the last call. first: of one that is looked at for the
+/// first time the newest decision is enough.
+void print_growth(const ShownJob& job, std::size_t& num_told, bool is_first) {
+  const std::vector<std::string>& said = job.growth;
+  if (is_first && said.size() > 1) num_told = said.size() - 1;
+  for (num_told = std::min(num_told, said.size()); num_told < said.size(); ++num_told)
+    fmt::print(stderr, "{}\n", said[num_told]);
+}
 
 /// A coordinator that has answered once may be away for a while: it is started again.
 Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
@@ -153,7 +134,7 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   std::optional<Clock::time_point> last_answer;
   std::string job = options.job;  // once it is found, its ID: others may take its name
   std::string told;               // what it waits for
-  GrowingJob growing;
+  std::size_t num_grown = 0;      // decisions that were printed
   for (;;) {
     const Result<ShownJob> answer = ask<ShownJob>(client, ShowJob{job});
     const std::chrono::duration<double> waited = Clock::now() - start;
@@ -166,18 +147,11 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
       continue;
     }
 
+    print_growth(*answer, num_grown, !last_answer);
     last_answer = Clock::now();
     job = answer->identity.id.hex();
     const JobDetail& detail = answer->detail;
     const bool expired = options.timeout_s > 0 && waited.count() >= options.timeout_s;
-    if (detail.summary.status == JobStatus::done && !expired) {
-      const Result<bool> grows = growing.grow(detail.summary.version, client);
-      if (!grows && grows.error().kind != ErrorKind::timeout) return grows.error();
-      if (!grows || *grows) {
-        std::this_thread::sleep_for(kPollInterval);
-        continue;
-      }
-    }
     if (!is_open(detail.summary.status) || expired) {
       print_detail(*answer, options.json);
       return is_open(detail.summary.status) ? ExitCode::timeout : exit_code_of(detail);
@@ -203,6 +177,23 @@ Result<ExitCode> change(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const ShownJob after, ask_until_done<ShownJob>(client, M{before.identity.id.hex()}));
   fmt::print(stderr, "{}", after.detail.plan);
   print_change(before, after, options.json);
+  return ExitCode::ok;
+}
+
+Result<ExitCode> lock(const JobOptions& options, RequestClient& client) {
+  Result<std::vector<FrameNumber>> frames = parse_frames(options.frames);
+  if (!frames) return Error{ErrorKind::usage, "--frames: " + frames.error().message};
+  const std::string which = format_frames(*frames);
+  BATON_ASSIGN(const ShownJob after,
+               ask_until_done<ShownJob>(
+                   client, LockFrames{options.job, std::move(frames).value(), options.off}));
+  fmt::print(stderr, "frames {} are {}\n", which,
+             options.off ? "not locked any more" : "locked: they stay and count as done");
+  print_detail(after, options.json);
+  const JobStatus status = after.detail.summary.status;
+  if (status == JobStatus::failed || status == JobStatus::cancelled)
+    fmt::print(stderr, "the job is {}: baton job retry {} goes on with it\n",
+               job_status_name(status), after.identity.id.short_hex());
   return ExitCode::ok;
 }
 
@@ -338,16 +329,21 @@ void add_job_command(CLI::App& app, ExitCode& code) {
       ->add_option("--rounds", refinement->rounds,
                    "a multiple of the job's quality.rounds; default: as many")
       ->check(CLI::Range(1, limits::kMaxRounds));
+  const auto [locks, choice] = add(
+      "lock", "Frames count as done from now on and stay as they are, whatever is in their files",
+      "ID", lock);
+  locks->add_option("--frames", choice->frames, "which: 12, 1-48x4, 20,30-32")->required();
+  locks->add_flag("--off", choice->off, "they are the job's again");
+  locks->footer("Example: baton job lock 3f2a --frames 20,30-32");
   const auto [removes, removal] =
       add("delete", "Forgets a job that has ended, and removes the states that it left", "",
           delete_jobs);
   removes->add_option("ID", removal->job, "job: its name, its ID, or the beginning of that");
   removes->add_flag("--ended", removal->all_ended, "every job that has ended");
-  const auto [waits, patience] =
-      add("wait",
-          "Returns when the job has ended, with its exit code; adds the sweeps that the job's "
-          "quality.noiseThreshold asks for; outlasts a restart of the coordinator",
-          "ID", wait);
+  const auto [waits, patience] = add(
+      "wait",
+      "Returns when the job has ended, with its exit code; outlasts a restart of the coordinator",
+      "ID", wait);
   waits->add_option("--timeout", patience->timeout_s, "seconds; default: as long as it takes")
       ->check(CLI::Range(0.0, 1e9));
 }

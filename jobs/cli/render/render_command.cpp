@@ -14,8 +14,7 @@ namespace {
 
 /// Says how the job ended; one that failed because its files cannot be loaded is bad input.
 ExitCode exit_code_of(const JobSpec& job, JobStatus status) {
-  if (is_open(status)) return ExitCode::failed;  // it waits for somebody
-  if (status != JobStatus::failed) return exit_code_of(status);
+  if (status != JobStatus::failed) return exit_code_of_stopped(status);
   const Result<AssetReport> assets = load_assets(job);
   return assets ? ExitCode::failed : exit_code_of(assets.error().kind);
 }

@@ -12,7 +12,6 @@
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/render/progress.h"
-#include "jobs/cli/sweeps.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -81,10 +80,13 @@ Result<RenderSession> RenderSession::start(const RenderOptions& options, const F
 }
 
 /// Follows the job to its end, reading finished frames for the sheet.
-Result<std::optional<ShownJob>> RenderSession::follow(const JobId& job, FrameSheet& sheet,
+Result<std::optional<ShownJob>> RenderSession::follow(const JobSpec& spec, const JobId& job,
+                                                      FrameSheet& sheet,
                                                       const std::function<bool()>& interrupted) {
   Progress progress(::isatty(STDERR_FILENO) == 1);
   std::string waits;
+  std::size_t num_grown = 0;
+  Digest version;
   for (;;) {
     BATON_ASSIGN(std::optional<ShownJob> shown,
                  ask_farm<ShownJob>(farm_, client_, signals_, ShowJob{job.hex()}));
@@ -92,6 +94,16 @@ Result<std::optional<ShownJob>> RenderSession::follow(const JobId& job, FrameShe
       for (const std::string& note : warnings_.fresh(shown->detail.notes)) {
         progress.finish();
         spdlog::warn("{}", note);
+      }
+      for (; num_grown < shown->growth.size(); ++num_grown) {
+        progress.finish();
+        fmt::print(stderr, "{}\n", shown->growth[num_grown]);
+      }
+      // More sweeps make all frames anew.
+      if (version != shown->detail.summary.version) {
+        version = shown->detail.summary.version;
+        progress = Progress(::isatty(STDERR_FILENO) == 1);
+        sheet = FrameSheet(spec);
       }
       progress.update(shown->detail.summary, Clock::now());
       if (!shown->detail.waits.empty() && waits.empty() &&
@@ -115,8 +127,8 @@ Result<std::optional<ShownJob>> RenderSession::follow(const JobId& job, FrameShe
   }
 }
 
-/// Renders the job as it is.
-Result<std::optional<ShownJob>> RenderSession::render_sweeps(
+/// Submits the job and follows it to its end.
+Result<std::optional<ShownJob>> RenderSession::render_document(
     const JobSpec& job, bool restart, FrameSheet& sheet, const std::function<bool()>& interrupted) {
   BATON_ASSIGN(const std::string document, make_job_document(job));
   for (;;) {
@@ -124,7 +136,8 @@ Result<std::optional<ShownJob>> RenderSession::render_sweeps(
                  ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{document, restart}));
     if (!accepted) return std::optional<ShownJob>();
     fmt::print(stderr, "{}", accepted->plan);
-    BATON_ASSIGN(std::optional<ShownJob> shown, follow(accepted->identity.id, sheet, interrupted));
+    BATON_ASSIGN(std::optional<ShownJob> shown,
+                 follow(job, accepted->identity.id, sheet, interrupted));
     // By what the workers render is known once they are there: then what they cannot go on with is
     // begun again.
     if (!restart || !shown || !shown->lacks_renderer) return shown;
@@ -135,22 +148,17 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
                                                        const std::function<bool()>& interrupted) {
   const Clock::time_point start = Clock::now();
   warnings_.begin(job);
-  MoreSweeps more(job, restart);
-  std::optional<FrameSheet> sheet;
-  std::optional<ShownJob> shown;
-  for (bool is_first = true;; is_first = false) {
-    sheet.emplace(job);
-    BATON_ASSIGN(shown, render_sweeps(job, restart && is_first, *sheet, interrupted));
-    if (!shown) return std::optional<JobStatus>();
-    if (shown->detail.summary.status != JobStatus::done || !more.add_to(job)) break;
-  }
+  FrameSheet sheet(job);
+  BATON_ASSIGN(const std::optional<ShownJob> shown,
+               render_document(job, restart, sheet, interrupted));
+  if (!shown) return std::optional<JobStatus>();
   const JobStatus status = shown->detail.summary.status;
   if (options_.json) {
     fmt::print("{}\n", detail_json(*shown).dump(2));
   } else {
     print_result(job, shown->detail, std::chrono::duration<double>(Clock::now() - start).count());
   }
-  write_sheet(*sheet, options_.display, options_.json);
+  write_sheet(sheet, options_.display, options_.json);
   if (status == JobStatus::done) BATON_TRY(write_png_of(job));
   if (status == JobStatus::failed) print_failures(shown->detail);
   if (shown->lacks_renderer && farm_.is_own())

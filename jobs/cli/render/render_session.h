@@ -51,8 +51,8 @@ class RenderSession {
                 RequestClient client)
       : options_(options), signals_(signals), farm_(std::move(farm)), client_(std::move(client)) {}
 
-  /// Renders a job whose motion and method are settled, with the sweeps that its quality asks for
-  /// (sweeps.h), shows how it gets on, and prints what came of it. A job that the farm has goes on
+  /// Renders a job whose motion and method are settled, with the sweeps that its quality asks for,
+  /// shows how it gets on, and prints what came of it. A job that the farm has goes on
   /// where it stopped. `interrupted` is asked now and then; nullopt when it says so, or when the
   /// user asked to stop. An error, io, of a job that has failed since frames are not what it has
   /// written.
@@ -66,10 +66,11 @@ class RenderSession {
   void stop() { farm_.stop(); }
 
  private:
-  Result<std::optional<ShownJob>> render_sweeps(const JobSpec& job, bool restart,
-                                                class FrameSheet& sheet,
-                                                const std::function<bool()>& interrupted);
-  Result<std::optional<ShownJob>> follow(const JobId& job, class FrameSheet& sheet,
+  Result<std::optional<ShownJob>> render_document(const JobSpec& job, bool restart,
+                                                  class FrameSheet& sheet,
+                                                  const std::function<bool()>& interrupted);
+  Result<std::optional<ShownJob>> follow(const JobSpec& spec, const JobId& job,
+                                         class FrameSheet& sheet,
                                          const std::function<bool()>& interrupted);
   Status write_png_of(const JobSpec& job) const;
 

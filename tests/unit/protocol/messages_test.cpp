@@ -50,7 +50,7 @@ const JobSummary kSummary{
     {1, 2}, "name", "owner", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6, 7, 8,
     9,      10,     11,      kStats};
 
-const JobIdentity kIdentity{{9}, 2, {10, 11, 12}};
+const JobIdentity kIdentity{{9}, 2, {10, 11, 12}, {FrameNumber(7)}};
 const TaskPlace kPlace{TaskKind::second_pass, FrameNumber(3), FrameNumber(4), 5, 6};
 
 /// One of each, in the order of the type codes, no member left at its default.
@@ -68,7 +68,7 @@ const std::vector<Message>& examples() {
       LeaseRevoke{kLease},
       NoWork{250},
       HelloAgain{},
-      JobDocument{{3, 4}, "{}", "mark"},
+      JobDocument{{3, 4}, "{}", "mark", {9}},
       Shutdown{},
       SubmitJob{std::string("a\0b", 3)},
       ListJobs{true},
@@ -86,7 +86,8 @@ const std::vector<Message>& examples() {
                 "on",
                 false,
                 {"odd"}},
-               true},
+               true,
+               {"4 rounds"}},
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
@@ -99,7 +100,9 @@ const std::vector<Message>& examples() {
       RequestStates{{3, 4}, {{5, 6}}},
       BlobsLeft{kLease, {{5, 6}}},
       ListEvents{"abc", {{9}, 3, 4, 5, false}},
-      EventList{{{1, 2, FarmEventKind::task_lost, "a", {9}, true, kPlace, "w", "gone", 2.5}}},
+      EventList{{{1, 2, FarmEventKind::task_lost, "a", {9}, true, kPlace, "w", "gone", 2.5}},
+                {{FarmEventKind::task_done, 3, 4.5}}},
+      LockFrames{"abc", {FrameNumber(1), FrameNumber(5)}, true},
   };
   return messages;
 }
@@ -123,13 +126,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 12);
+  static_assert(kProtocolVersion == 13);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "56fb8a0b032fa3ab120551233cba5adc");
+  EXPECT_EQ(digest_of(all).hex(), "4412b9f14ce14367d701032f416079a7");
 }
 
 TEST(Messages, MembersArriveWhereTheyWereSent) {
@@ -142,7 +145,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0C\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0D\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -182,12 +185,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{13};
+  frames[0][5] = std::byte{14};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 13, this program speaks 12"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 14, this program speaks 13"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

@@ -1,0 +1,68 @@
+#include "coordinator/service/locked_frames.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+
+#include "common/base/file_stamp.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
+
+namespace baton {
+
+LockedFrames::LockedFrames(const JobSpec& spec, const std::vector<FrameNumber>& numbers) {
+  for (FrameIndex frame; frame.index() < spec.frames.size() && !numbers.empty(); ++frame) {
+    if (std::ranges::binary_search(numbers, spec.frames[frame.index()])) frames_.insert(frame);
+  }
+}
+
+std::string locked_text(const JobSpec& spec, const LockedFrames& locked) {
+  if (locked.frames().empty()) return {};
+  std::vector<FrameNumber> numbers;
+  for (const FrameIndex frame : locked.frames()) numbers.push_back(spec.frames[frame.index()]);
+  const bool is_one = numbers.size() == 1;
+  return fmt::format("{} {} {} locked and {} as {}", is_one ? "frame" : "frames",
+                     format_frames(numbers), is_one ? "is" : "are", is_one ? "stays" : "stay",
+                     is_one ? "it is" : "they are");
+}
+
+Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
+                                               const std::vector<FrameNumber>& frames,
+                                               const Scheduler::Job* job) {
+  std::vector<FrameIndex> places;
+  std::vector<FrameNumber> unknown;
+  for (const FrameNumber frame : frames) {
+    const auto found = std::ranges::find(spec.frames, frame);
+    if (found == spec.frames.end()) {
+      unknown.push_back(frame);
+    } else {
+      places.emplace_back(static_cast<std::int32_t>(found - spec.frames.begin()));
+    }
+  }
+  if (!unknown.empty()) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("job '{}': it has no frames {}, expected some of {}", spec.name,
+                             format_frames(unknown), format_frames(spec.frames))};
+  }
+  for (const FrameIndex frame : places) {
+    const std::filesystem::path path = frame_path(spec, frame);
+    BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
+    if (!stamp)
+      return Error{ErrorKind::bad_input, path.string() + ": is not there, and cannot be locked"};
+    const bool is_leased =
+        job != nullptr && job->tasks.book().status(frame.value()) == TaskStatus::leased;
+    if (is_leased) return Error{ErrorKind::timeout, path.string() + ": a worker is writing it"};
+  }
+  return places;
+}
+
+Status expect_locked(const JobIdentity& job, const std::vector<FrameNumber>& frames) {
+  std::vector<FrameNumber> others;
+  std::ranges::set_difference(frames, job.locked, std::back_inserter(others));
+  if (others.empty()) return {};
+  return Error{ErrorKind::bad_input, fmt::format("job {}: frames {} are not locked",
+                                                 job.id.short_hex(), format_frames(others))};
+}
+
+}  // namespace baton

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/job_id.h"
+#include "common/job/job_spec.h"
+#include "coordinator/schedule/scheduler.h"
+
+namespace baton {
+
+/// The frames of one document that are locked: they count as done, and what is in their files is
+/// neither read nor replaced. The files must be there.
+class LockedFrames {
+ public:
+  LockedFrames() = default;
+  /// numbers: JobIdentity::locked; those that the document does not have are left out.
+  LockedFrames(const JobSpec& spec, const std::vector<FrameNumber>& numbers);
+
+  bool contains(FrameIndex frame) const { return frames_.contains(frame); }
+  const std::set<FrameIndex>& frames() const { return frames_; }
+
+ private:
+  std::set<FrameIndex> frames_;
+};
+
+/// For people: which frames stay as they are; empty: none are locked.
+std::string locked_text(const JobSpec& spec, const LockedFrames& locked);
+
+/// The places of frames that are to be locked. job: of this document; null: it has ended. Errors:
+/// bad_input, the document does not have them all, or a file is not there; timeout, a worker is
+/// writing one now; those of stamp_of().
+Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
+                                               const std::vector<FrameNumber>& frames,
+                                               const Scheduler::Job* job);
+/// Error (bad_input): some of these frames are not locked.
+Status expect_locked(const JobIdentity& job, const std::vector<FrameNumber>& frames);
+
+}  // namespace baton

@@ -1,0 +1,117 @@
+#!/usr/bin/env python3
+"""Sequences of edits of jobs, each submitted while the one before is at work: names of files, frames both ways, AOVs, sweeps,
+tiles. Waiters are killed, the last version is left alone, and every frame of it must be there and right.
+
+usage: edits.py --bin FOLDER [--sequences N] [--seed S] [--keep]
+"""
+
+import argparse
+import contextlib
+import json
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from chaos_jobs import KINDS, Job, Undisturbed, edits_of
+from farm import OK, PATIENCE, Farm, Fault, Programs, check, wait_until
+
+EDITS, END_S = 5, 120 * PATIENCE
+AT_ONCE = 4  # sequences on one farm
+
+
+class Sequence:
+    """One job and its edits."""
+
+    def __init__(self, farm, number, seed):
+        self.farm, self.rng, self.diary = farm, random.Random(seed), []
+        self.job = Job(self.rng.choice(list(KINDS)), f"-{number}", farm.folder)
+        self.next_at = 0
+        self.left = EDITS
+
+    def submit(self):
+        answer = self.farm.baton("job", "submit", self.job.path, "--json", expect=None)
+        check(answer.returncode == OK, f"{self}: {answer.stderr}")
+        ident = json.loads(answer.stdout)["id"]
+        check(self.job.id in (None, ident), f"{self}: another ID, {ident} after {self.job.id}")
+        self.job.id = ident
+
+    def tend(self):
+        """Edits the job when it is time. Returns whether it has ended."""
+        if time.monotonic() < self.next_at:
+            return False
+        if self.job.id is None:
+            self.submit()
+        elif self.left > 0:
+            what, settings = self.rng.choice(edits_of(self.job, self.rng))
+            self.job.edit(**settings)
+            self.diary.append(f"{what} {json.dumps(settings)}")
+            self.submit()
+            self.left -= 1
+        else:
+            shown = self.farm.show(self.job.id)
+            check(shown["status"] in ("running", "done"), f"{self}: {shown['status']}, {shown.get('waits')}")
+            return shown["status"] == "done"
+        if self.rng.random() < 0.3:
+            waiter = subprocess.Popen([self.farm.programs.path("baton"), "job", "wait", self.job.id, "--coordinator",
+                                       self.farm.endpoint], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(self.rng.uniform(0, 0.3))
+            waiter.kill()
+            waiter.wait()
+        # From at once to after the end.
+        self.next_at = time.monotonic() + self.rng.choice([0, 0.3, 1, 3]) * self.rng.random()
+        return False
+
+    def __str__(self):
+        return f"{self.job.path.stem} after {'; '.join(self.diary)}"
+
+
+def run(programs, folder, num_sequences, seed):
+    """Everything. Raises Fault."""
+    folder.mkdir(parents=True, exist_ok=True)
+    expected = Undisturbed(programs, folder / "plain")
+    num_edits = 0
+    with contextlib.ExitStack() as stack:
+        farm = stack.enter_context(Farm(programs, folder / "farm", workers=2))
+        for first in range(0, num_sequences, AT_ONCE):
+            sequences = [Sequence(farm, number, f"{seed} {number}") for number in range(first, min(first + AT_ONCE, num_sequences))]
+            waiting = list(sequences)
+
+            def all_done():
+                waiting[:] = [sequence for sequence in waiting if not sequence.tend()]
+                return not waiting
+            wait_until(all_done, f"sequences {first} on are done: {', '.join(map(str, sequences))}", END_S)
+            for sequence in sequences:
+                num_edits += len(sequence.diary)
+                try:
+                    expected.check(sequence.job)
+                except Fault as fault:
+                    raise Fault(f"{sequence}: {fault}") from fault
+                shutil.rmtree(sequence.job.frames)
+        check("BUG" not in farm.coordinator.log(), "the coordinator has found a bug")
+    print(f"seed {seed}: {num_sequences} sequences, {num_edits} edits; all frames right")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--bin", required=True, help="folder of the programs")
+    parser.add_argument("--sequences", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(1 << 30))
+    parser.add_argument("--keep", action="store_true", help="leave the files")
+    options = parser.parse_args()
+    folder = Path(tempfile.mkdtemp(prefix="baton-edits-"))
+    try:
+        run(Programs(options.bin), folder, options.sequences, options.seed)
+    except Fault as fault:
+        print(f"seed {options.seed}: {fault}\nfiles are in {folder}")
+        return 1
+    if not options.keep:
+        shutil.rmtree(folder, ignore_errors=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
