@@ -70,8 +70,10 @@ def test_a_region_has_the_pixels_of_the_whole(programs, folder):
     whole = programs.values(look, "G")
     render(programs, job, "--frames", "2-3", "--region", "35,20,90,50")
     part = programs.values(look, "G")
-    expected = [whole[y * 160 + x] for y in range(20, 70) for x in range(35, 125)]
-    check_equal(part, expected, "pixels of the region")
+    # Blocks of 4 x 4 pixels, which learn together, have other noise where the border cuts them.
+    inside = [(x, y) for y in range(20, 68) for x in range(36, 124)]
+    check_equal([part[(y - 20) * 90 + x - 35] for x, y in inside], [whole[y * 160 + x] for x, y in inside],
+                "pixels of the region")
 
 
 def test_check_and_explain_take_the_same_options(programs, folder):

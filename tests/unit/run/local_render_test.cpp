@@ -58,9 +58,11 @@ TEST(LocalRender, ARegionIsThatPartOfTheWholePicture) {
   job.image = {.width = 21, .height = 17, .sites = 4, .tile_size = 8};
   job.frames = test::frame_numbers(3);
   job.output.aovs = {Aov::source, Aov::normal, Aov::depth};
-  const PixelRect region{3, 5, 14, 17};
   for (const Method method : {Method::pool, Method::sequential, Method::bidirectional}) {
     job.sampling.method = method;
+    // Blocks of pixels that learn together must not be cut.
+    const PixelRect region =
+        method == Method::pool ? PixelRect{4, 8, 16, 17} : PixelRect{3, 5, 14, 17};
     job.image.region.reset();
     const std::vector<FilmTile> whole = images(job);
     job.image.region = region;
@@ -73,24 +75,27 @@ TEST(LocalRender, ARegionIsThatPartOfTheWholePicture) {
 // Overscan changes nothing inside, whatever is cut off on the sides.
 TEST(LocalRender, APictureIsTheSameBytesWithOverscan) {
   JobSpec job = test::box_job();
-  job.image = {.width = 21, .height = 17, .sites = 4, .tile_size = 8};
+  job.image = {.width = 20, .height = 16, .sites = 4, .tile_size = 8};
   job.frames = test::frame_numbers(3);
   job.output.aovs = {Aov::source, Aov::normal, Aov::depth, Aov::motion, Aov::crypto_object};
-  const PixelRect region{3, 5, 14, 17};
   for (const Method method : {Method::pool, Method::sequential, Method::bidirectional}) {
     job.sampling.method = method;
     job.image.overscan = {};
     const std::vector<FilmTile> plain = images(job);
     job.image.overscan = {5, 0, 2, 9};
     const std::vector<FilmTile> wide = images(job);
+    // With its overscan it begins and ends where blocks do, or the rest does.
+    const PixelRect region =
+        method == Method::pool ? PixelRect{5, 4, 14, 15} : PixelRect{3, 5, 14, 16};
+    const PixelRect rendered{region.x0 - 5, region.y0, region.x1 + 2, region.y1 + 9};
     job.image.region = region;
     const std::vector<FilmTile> part = images(job);
     job.image.region.reset();
     for (std::size_t frame = 0; frame < plain.size(); ++frame) {
-      EXPECT_EQ(wide[frame].rect, (PixelRect{-5, 0, 23, 26}));
-      EXPECT_EQ(part_of(wide[frame], {0, 0, 21, 17}), plain[frame]) << traits(method).name;
-      EXPECT_EQ(part[frame].rect, (PixelRect{-2, 5, 16, 26}));
-      EXPECT_EQ(part[frame], part_of(wide[frame], {-2, 5, 16, 26}))
+      EXPECT_EQ(wide[frame].rect, (PixelRect{-5, 0, 22, 25}));
+      EXPECT_EQ(part_of(wide[frame], {0, 0, 20, 16}), plain[frame]) << traits(method).name;
+      EXPECT_EQ(part[frame].rect, rendered);
+      EXPECT_EQ(part[frame], part_of(wide[frame], rendered))
           << traits(method).name << ": a region with overscan";
     }
   }
