@@ -259,14 +259,14 @@ struct QualitySpec {
   std::optional<float> adaptive_threshold{};
   /// Films stay after the job, for one of more sweeps.
   bool refinable = false;
-  /// `baton render` adds sweeps until no frame is noisier, in Cycles' measure; > 0.
+  /// The farm adds sweeps until no frame is noisier, in Cycles' measure; > 0.
   std::optional<float> noise_threshold{};
-  /// `baton render` adds no sweep that would end later, s; > 0.
+  /// The farm adds no sweep that would end later, s; > 0.
   std::optional<float> time_limit{};
-  /// `baton render` adds no sweep past so many rounds; >= rounds, 0: no limit.
+  /// The farm adds no sweep past so many rounds; >= rounds, 0: no limit.
   int max_rounds = 0;
 
-  /// Whether `baton render` may add sweeps.
+  /// Whether the farm may add sweeps.
   bool may_grow() const { return noise_threshold || time_limit || max_rounds > 0; }
 
   bool operator==(const QualitySpec&) const = default;

@@ -57,8 +57,10 @@ struct TaskFailed {
 /// The worker will not do it: nobody's failure, and no loss.
 struct LeaseReturn {
   LeaseId lease;
-  /// The folder of the job that the worker cannot see; empty: it has no time left.
+  /// The folder of the job that the worker cannot see; empty: it has no time left, or not_held.
   std::string unseen = {};
+  /// Held inputs of the task that are not here any more: what made them must be done again.
+  std::vector<BlobRef> not_held = {};
 };
 struct JobDocumentRequest {
   Digest job;

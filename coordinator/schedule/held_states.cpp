@@ -11,9 +11,9 @@ bool may_hold(const JobTasks& tasks, TaskIndex task) {
     return false;
   const bool is_last = key.run() + 1 == Run(graph.num_runs());
   const bool is_first_sweep = graph.timeline().sweep_of(graph.steps(key).first) == Sweep(0);
-  return !is_last && is_first_sweep && !tasks.ledger().keeps_state(key) &&
-         !tasks.ledger().is_cut(task) && !tasks.attempts().has_failed() &&
-         tasks.made().tells_makers();
+  return !is_last && is_first_sweep && tasks.made().former_outputs(task).empty() &&
+         !tasks.ledger().keeps_state(key) && !tasks.ledger().is_cut(task) &&
+         !tasks.attempts().has_failed() && tasks.made().tells_makers();
 }
 
 std::vector<std::pair<std::string, Digest>> held_inputs(const JobTasks& tasks, TaskIndex task) {

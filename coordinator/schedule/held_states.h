@@ -11,8 +11,9 @@ namespace baton {
 /// Held states: a worker may keep what it made between checkpoints in memory and out of the store.
 /// Then it alone can read it, until it publishes it.
 
-/// Whether the state of a render task may be held: it is neither a checkpoint nor a result, and
-/// nothing of the job has failed yet, so no task must change its worker.
+/// Whether the state of a render task may be held: it is neither a checkpoint nor a result, nothing
+/// of the job has failed yet, so no task must change its worker, and it is not made again, so that
+/// what is lost is lost once.
 bool may_hold(const JobTasks& tasks, TaskIndex task);
 /// The held inputs of a task that has its inputs, with the workers that hold them.
 std::vector<std::pair<std::string, Digest>> held_inputs(const JobTasks& tasks, TaskIndex task);

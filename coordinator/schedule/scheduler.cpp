@@ -294,7 +294,11 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   }
   tasks.attempts().add_returned(claim.task, event.lease, event.worker);
   lose_lease(event.lease.job, claim.task, "its inputs are gone or damaged", actions);
-  if (is_open(claim.job->status)) reopen({event.lease.job, makers}, *claim.job, actions);
+  if (!is_open(claim.job->status)) return;
+  RecordReopened record{event.lease.job, makers};
+  if (std::ranges::any_of(event.inputs, &BlobRef::is_held))
+    record.gone = fmt::format("what worker {} held", event.worker);
+  reopen(std::move(record), *claim.job, actions);
 }
 
 void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) {

@@ -259,6 +259,11 @@ Status Service::receive_from(const std::string& worker, const StatesPublished& m
 }
 
 Status Service::receive_from(const std::string& worker, const LeaseReturn& message) {
+  if (!message.not_held.empty()) {
+    std::vector<BlobRef> gone = message.not_held;
+    std::erase_if(gone, [](const BlobRef& input) { return !input.is_held(); });
+    return farm_.step(InputsLost{worker, message.lease, std::move(gone)});
+  }
   const std::string unseen = message.unseen.substr(0, limits::kMaxTextLength);
   if (!unseen.empty())
     tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,

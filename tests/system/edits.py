@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Sequences of edits of jobs, each submitted while the one before is at work: names of files, frames both ways, AOVs, sweeps,
-tiles. Waiters are killed, the last version is left alone, and every frame of it must be there and right.
+tiles. Waiters are killed, the last version is left alone, and every frame of it must be there and right; no attempt may fail.
 
 usage: edits.py --bin FOLDER [--sequences N] [--seed S] [--keep]
 """
@@ -91,7 +91,10 @@ def run(programs, folder, num_sequences, seed):
                 except Fault as fault:
                     raise Fault(f"{sequence}: {fault}") from fault
                 shutil.rmtree(sequence.job.frames)
-        check("BUG" not in farm.coordinator.log(), "the coordinator has found a bug")
+        log = farm.coordinator.log()
+        check("BUG" not in log, "the coordinator has found a bug")
+        failed = [line for line in log.splitlines() if ": attempt " in line and " failed: " in line]
+        check(not failed, f"{len(failed)} attempts have failed: {failed[:1]}")
     print(f"seed {seed}: {num_sequences} sequences, {num_edits} edits; all frames right")
 
 

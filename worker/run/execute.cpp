@@ -37,9 +37,11 @@ Result<FilmTile> read_film(const LoadedJob& loaded, const BlobStore& store, cons
                            static_cast<int>(pass))};
 }
 
-/// The states that a render task starts from, in the order of its inputs.
+/// The states that a render task starts from, in the order of its inputs. not_held: held ones that
+/// are not here.
 Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobStore& store,
-                                          const std::vector<BlobRef>& inputs) {
+                                          const std::vector<BlobRef>& inputs,
+                                          std::vector<BlobRef>& not_held) {
   std::vector<StatePtr> states;
   for (const BlobRef& input : inputs) {
     if (input.kind == BlobKind::film) continue;  // earlier sweeps: read at their turn
@@ -48,8 +50,10 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
                    fmt::format("{}: a render task takes states and films", blob_name(input))};
     }
     StatePtr state = loaded.states->find(input);
-    if (state == nullptr && input.is_held())
-      return Error{ErrorKind::corrupt, fmt::format("{}: is not held here", blob_name(input))};
+    if (state == nullptr && input.is_held()) {
+      not_held.push_back(input);
+      continue;
+    }
     if (state == nullptr) {
       BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
       BATON_ASSIGN(SampleState decoded,
@@ -68,7 +72,9 @@ Result<TaskResult> execute_cut(const LoadedJob& loaded, BlobStore& store, const 
   TaskResult output;
   const CpuTimer timer(output.made.stats.seconds_state);
   const PixelRect rect = TileGrid(loaded.job.image).rect(task.tile);
-  BATON_ASSIGN(const std::vector<StatePtr> others, read_states(loaded, store, inputs));
+  BATON_ASSIGN(const std::vector<StatePtr> others,
+               read_states(loaded, store, inputs, output.not_held));
+  if (!output.not_held.empty()) return output;
   std::vector<const SampleState*> parts;
   for (const StatePtr& other : others) {
     if (other->step != step || other->picture != loaded.picture) {
@@ -117,15 +123,16 @@ Result<TaskResult> execute_render(const LoadedJob& loaded, BlobStore& store, con
   }
   if (steps.empty()) return execute_cut(loaded, store, task, steps.last, grant.inputs);
   double seconds_read = 0;
+  TaskResult output;
   std::vector<StatePtr> previous;
   {
     const CpuTimer timer(seconds_read);
-    BATON_ASSIGN(previous, read_states(loaded, store, grant.inputs));
+    BATON_ASSIGN(previous, read_states(loaded, store, grant.inputs, output.not_held));
   }
+  if (!output.not_held.empty()) return output;
   double seconds_state = seconds_read;
 
   // Render.
-  TaskResult output;
   const auto keep = [&](BlobKind kind, Step step, const Bytes& bytes) -> Status {
     BATON_ASSIGN(const Digest digest, store.put(bytes));
     output.made.outputs.push_back({kind, step.value(), task.tile, digest, bytes.size()});

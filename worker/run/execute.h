@@ -18,6 +18,8 @@ struct TaskResult {
   TaskOutput made;
   /// What this machine does not see of the job, a line; then nothing was done.
   std::string unseen = {};
+  /// Held inputs that are not here; then nothing was done.
+  std::vector<BlobRef> not_held = {};
   /// About files, for people: what was repaired, what is odd.
   std::vector<std::string> notes = {};
 };

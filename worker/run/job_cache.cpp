@@ -131,6 +131,11 @@ LoadedJobPtr JobEntry::loaded() const {
   return result_ && result_->ok() ? result_->value() : nullptr;
 }
 
+std::shared_ptr<JobStates> JobEntry::states() const {
+  const LoadedJobPtr job = loaded();
+  return job != nullptr ? job->states : states_;
+}
+
 Result<LoadedJobPtr> JobEntry::load(const std::stop_token& stop) {
   // Wait until there is something to do or to return.
   std::unique_lock lock(mutex_);
@@ -152,6 +157,11 @@ Result<LoadedJobPtr> JobEntry::load(const std::stop_token& stop) {
     if (!stop.stop_requested()) result = loader_(*document_);
     lock.lock();
   }
+  if (result && states_ != nullptr) {
+    LoadedJob job = **result;
+    job.states = states_;
+    result = LoadedJobPtr(std::make_shared<const LoadedJob>(std::move(job)));
+  }
   result_ = result;
   changed_.notify_all();
   return result;
@@ -171,6 +181,31 @@ std::vector<LoadedJobPtr> JobCache::loaded() const {
   return jobs;
 }
 
+std::vector<std::pair<Digest, std::shared_ptr<JobStates>>> JobCache::states() const {
+  std::vector<std::pair<Digest, std::shared_ptr<JobStates>>> all(aside_.begin(), aside_.end());
+  for (const std::shared_ptr<JobEntry>& entry : entries_) {
+    if (auto states = entry->states()) all.emplace_back(entry->digest(), std::move(states));
+  }
+  return all;
+}
+
+/// What the job holds outlives its scene: nobody else has it.
+void JobCache::set_aside(const JobEntry& entry) {
+  std::shared_ptr<JobStates> states = entry.states();
+  if (states == nullptr || states->held().empty()) return;
+  states->drop_kept();
+  aside_.emplace_front(entry.digest(), std::move(states));
+  if (aside_.size() > limits::kMaxCachedJobs) aside_.pop_back();
+}
+
+std::shared_ptr<JobStates> JobCache::take_from_aside(const Digest& digest) {
+  const auto found = std::ranges::find(aside_, digest, &decltype(aside_)::value_type::first);
+  if (found == aside_.end()) return nullptr;
+  std::shared_ptr<JobStates> states = std::move(found->second);
+  aside_.erase(found);
+  return states;
+}
+
 std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
   // Move the job to the front.
   const auto found = std::find_if(entries_.begin(), entries_.end(),
@@ -180,16 +215,22 @@ std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
       entries_.splice(entries_.begin(), entries_, found);
       return entries_.front();
     }
+    set_aside(**found);
     entries_.erase(found);
   }
+
+  std::shared_ptr<JobStates> states = take_from_aside(digest);
 
   // Make room. A job that tasks still use stays: a document that arrives for it must find it.
   for (auto oldest = entries_.end(); oldest != entries_.begin() && !has_room_for_another();) {
     --oldest;
-    if (oldest->use_count() == 1) oldest = entries_.erase(oldest);
+    if (oldest->use_count() > 1) continue;
+    set_aside(**oldest);
+    oldest = entries_.erase(oldest);
   }
   for (const LoadedJobPtr& job : loaded()) job->states->drop_kept();
-  entries_.push_front(std::make_shared<JobEntry>(digest, loader_, file_patience_));
+  entries_.push_front(
+      std::make_shared<JobEntry>(digest, loader_, file_patience_, std::move(states)));
   return entries_.front();
 }
 

@@ -69,9 +69,14 @@ inline constexpr std::chrono::milliseconds kFilePatience{5000};
 /// others wait.
 class JobEntry {
  public:
+  /// states: that the process has of the job already; null: none.
   JobEntry(const Digest& digest, JobLoader loader,
-           std::chrono::milliseconds file_patience = kFilePatience)
-      : digest_(digest), loader_(std::move(loader)), file_patience_(file_patience) {}
+           std::chrono::milliseconds file_patience = kFilePatience,
+           std::shared_ptr<JobStates> states = nullptr)
+      : digest_(digest),
+        loader_(std::move(loader)),
+        file_patience_(file_patience),
+        states_(std::move(states)) {}
 
   const Digest& digest() const { return digest_; }
   /// Hands over the document; a second one is ignored.
@@ -81,6 +86,8 @@ class JobEntry {
   bool failed() const;
   /// Null unless it is loaded.
   LoadedJobPtr loaded() const;
+  /// Those of the job; null: there are none.
+  std::shared_ptr<JobStates> states() const;
   /// Waits for the document, then loads once for all callers; once more after a while if a file
   /// could not be read. Cancelled when `stop` is requested while waiting.
   Result<LoadedJobPtr> load(const std::stop_token& stop);
@@ -89,6 +96,7 @@ class JobEntry {
   const Digest digest_;
   const JobLoader loader_;
   const std::chrono::milliseconds file_patience_;
+  const std::shared_ptr<JobStates> states_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::optional<JobDocument> document_;
@@ -112,15 +120,22 @@ class JobCache {
   std::shared_ptr<JobEntry> entry(const Digest& digest);
   /// Those that are loaded, most recent first.
   std::vector<LoadedJobPtr> loaded() const;
+  /// The states of jobs that are loaded, and what others hold.
+  std::vector<std::pair<Digest, std::shared_ptr<JobStates>>> states() const;
 
  private:
   bool has_room_for_another() const;
+  void set_aside(const JobEntry& entry);
+  std::shared_ptr<JobStates> take_from_aside(const Digest& digest);
 
   JobLoader loader_;
   std::chrono::milliseconds file_patience_;
   std::uint64_t max_idle_scene_bytes_;
   /// At most limits::kMaxCachedJobs, and beyond that those in use.
   std::list<std::shared_ptr<JobEntry>> entries_;
+  /// What jobs hold that had to make room, latest first, at most limits::kMaxCachedJobs: nobody
+  /// says which of them have ended. A job whose states go all the same has them made again.
+  std::list<std::pair<Digest, std::shared_ptr<JobStates>>> aside_;
 };
 
 }  // namespace baton

@@ -77,8 +77,9 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   next_request_ = now;  // what ended may have made work
 
   // Report, unless the task was given up.
-  if (event.result && !event.result->unseen.empty()) {
-    actions.push_back(SendMessage{LeaseReturn{event.lease, event.result->unseen}});
+  if (event.result && !(event.result->unseen.empty() && event.result->not_held.empty())) {
+    actions.push_back(
+        SendMessage{LeaseReturn{event.lease, event.result->unseen, event.result->not_held}});
   } else if (event.result) {
     reports_.push_back(
         {event.lease, TaskDone{event.lease, event.result->made, event.result->notes}, now});

@@ -349,11 +349,10 @@ class Worker {
   }
   void perform(PackHeld& action) {
     std::vector<std::pair<Digest, JobStates::List>> jobs;
-    for (const LoadedJobPtr& job : jobs_.loaded()) {
-      if (action.request && action.request->job != job->digest) continue;
-      JobStates::List states =
-          action.request ? job->states->held(action.request->states) : job->states->held();
-      if (!states.empty()) jobs.emplace_back(job->digest, std::move(states));
+    for (const auto& [job, kept] : jobs_.states()) {
+      if (action.request && action.request->job != job) continue;
+      JobStates::List states = action.request ? kept->held(action.request->states) : kept->held();
+      if (!states.empty()) jobs.emplace_back(job, std::move(states));
     }
     packing_.push_back(
         std::async(std::launch::async, [this, jobs = std::move(jobs), store = store_] {

@@ -95,7 +95,7 @@ const std::vector<Message>& examples() {
       Drain{},
       ReportReceived{kLease},
       DeleteJob{"def"},
-      LeaseReturn{kLease, "/shows"},
+      LeaseReturn{kLease, "/shows", {kBlob}},
       StatesPublished{{1, 2}, {{kBlob, kBlob}}},
       RequestStates{{3, 4}, {{5, 6}}},
       BlobsLeft{kLease, {{5, 6}}},
@@ -132,7 +132,7 @@ TEST(Messages, TheirBytesAreThoseOfTheVersion) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "4412b9f14ce14367d701032f416079a7");
+  EXPECT_EQ(digest_of(all).hex(), "64e8b6abe9dd095e43c83fb201e7a3da");
 }
 
 TEST(Messages, MembersArriveWhereTheyWereSent) {

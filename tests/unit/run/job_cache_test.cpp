@@ -120,6 +120,32 @@ TEST(JobCache, AJobInUseIsNotForgotten) {
     EXPECT_FALSE(cache.entry({0, i})->has_document()) << i;
 }
 
+// What a job holds is nowhere else: its scene may go, its states not.
+TEST(JobCache, WhatAJobHoldsOutlivesItsScene) {
+  JobCache cache([](const JobDocument& document) -> Result<LoadedJobPtr> {
+    auto job = std::make_shared<LoadedJob>(LoadedJob{{}, document.job, {}, nullptr});
+    job->states = std::make_shared<JobStates>(std::make_shared<MemoryShare>(1 << 20));
+    return LoadedJobPtr(std::move(job));
+  });
+  const auto load = [&](const Digest& job) {
+    const auto entry = cache.entry(job);
+    entry->provide({job, "text"});
+    return entry->load({}).value();
+  };
+  const BlobRef held{BlobKind::state, 0, 0, held_state_name({1, 1}, Step(0), 0)};
+  const auto state = std::make_shared<const SampleState>();
+  ASSERT_TRUE(load({1, 1})->states->hold(held, state));
+  for (std::uint64_t i = 0; i < 2 * limits::kMaxCachedJobs; ++i) (void)load({2, i});
+  EXPECT_FALSE(cache.entry({1, 1})->has_document()) << "its scene is gone";
+  EXPECT_EQ(load({1, 1})->states->find(held), state);
+
+  // Without being loaded again it can still publish them.
+  for (std::uint64_t i = 0; i < 2 * limits::kMaxCachedJobs; ++i) (void)load({3, i});
+  std::size_t num_held = 0;
+  for (const auto& [job, states] : cache.states()) num_held += states->held().size();
+  EXPECT_EQ(num_held, 1u);
+}
+
 // Its folders may be mounted by the time that a task of it comes again.
 TEST(JobCache, AJobThatWasNotSeenIsLookedForAgain) {
   int loads = 0;

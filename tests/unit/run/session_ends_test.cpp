@@ -19,6 +19,17 @@ TEST_F(SessionTest, GivesBackWhatItDropsWhenItDrains) {
   EXPECT_EQ(sent<LeaseReturn>(grant(lease(2))).at(0).lease, lease(2));
 }
 
+TEST_F(SessionTest, GivesBackATaskWhoseHeldInputsItDoesNotHave) {
+  welcome();
+  grant(lease(0));
+  const BlobRef held{BlobKind::state, 1, 2, held_state_name({1, 1}, Step(1), 2)};
+  const auto actions = step(TaskEnded{lease(0), TaskResult{.made = {}, .not_held = {held}}});
+  ASSERT_EQ(sent<LeaseReturn>(actions).size(), 1u);
+  EXPECT_EQ(sent<LeaseReturn>(actions)[0].not_held, std::vector{held});
+  EXPECT_TRUE(sent<TaskDone>(actions).empty());
+  EXPECT_TRUE(sent<TaskFailed>(actions).empty());
+}
+
 TEST_F(SessionTest, GivesBackATaskOfAJobThatItCannotSee) {
   welcome();
   grant(lease(0));

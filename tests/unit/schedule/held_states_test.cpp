@@ -130,6 +130,30 @@ TEST_F(HeldStatesTest, WhatIsReportedForALeaseTakenUpAgainIsMadeAgain) {
   EXPECT_TRUE(all_of<RecordCompletion>(finish(before)).empty());
 }
 
+// It has come to lose them in some way: what made them is done again, and put where it stays.
+TEST_F(HeldStatesTest, WhatAHolderDoesNotHaveIsMadeAgainOnce) {
+  render_first_frame();
+  const GrantLease grant = farm.ask_one("a");
+  ASSERT_EQ(grant.lease.task.kind, TaskKind::render);
+  const auto actions = farm.step(InputsLost{"a", grant.lease, {grant.inputs.front()}});
+  EXPECT_TRUE(all_of<RecordFailure>(actions).empty()) << "it costs no attempt";
+  const auto reopened = all_of<RecordReopened>(actions);
+  ASSERT_EQ(reopened.size(), 1u);
+  EXPECT_EQ(reopened[0].tasks, std::vector{render(0, grant.inputs.front().tile)});
+  EXPECT_EQ(reopened[0].gone, "what worker a held");
+
+  bool is_made_again = false, are_others_held = false;
+  for (GrantLease next = farm.ask_one("a"); next.lease.attempt > 0; next = farm.ask_one("a")) {
+    is_made_again |= next.lease.task == reopened[0].tasks[0];
+    EXPECT_FALSE(next.lease.task == reopened[0].tasks[0] && next.may_hold);
+    are_others_held |= next.may_hold;
+    finish(next);
+  }
+  EXPECT_TRUE(is_made_again);
+  EXPECT_TRUE(are_others_held);
+  EXPECT_EQ(farm.status(), JobStatus::done);
+}
+
 // A worker that has no time for a task has not failed it: holding goes on.
 TEST_F(HeldStatesTest, AfterAReturnedLeaseStatesAreHeldAsBefore) {
   render_first_frame();
