@@ -65,7 +65,8 @@ struct SampleState {
   std::vector<PixelSource> source;  ///< (pixels, K)
 
   const StateFormat* format = nullptr;
-  std::vector<StatePlane> planes;  ///< of the pixels, as StateFormat::pixel_bytes lists them
+  /// Of the pixels, as StateFormat::pixel_bytes lists them.
+  std::vector<StatePlane> planes;
   /// Of the blocks, as StateFormat::block_bytes lists them.
   std::vector<StatePlane> block_planes;
 

@@ -247,7 +247,8 @@ struct CandidateLanes {
   VF weight;
   VF per_target;        ///< weight / p~
   Vec3Lanes reflected;  ///< (f cos L)_rgb
-  VF inverse_density;   ///< of the map's table, in sr; past all bounds where there is none
+  /// Of the map's table, in sr; past all bounds where there is none.
+  VF inverse_density;
 };
 
 HWY_INLINE void StoreCandidates(const CandidateLanes& c, std::size_t at,

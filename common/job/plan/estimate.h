@@ -26,7 +26,7 @@ struct JobEstimate {
   std::int64_t film_bytes = 0;
   std::int64_t frame_bytes = 0;            ///< one EXR, before compression
   std::int64_t state_bytes_per_pixel = 0;  ///< in memory; 0 when no state is carried
-  std::int64_t state_bytes_per_block = 0;  ///< what its pixels have in common (PixelBlocks)
+  std::int64_t state_bytes_per_block = 0;  ///< of PixelBlocks
   std::int64_t tile_state_bytes = 0;       ///< state of one tile in memory
   /// Size of the states of all tiles at one checkpoint, in memory.
   std::int64_t state_bytes = 0;

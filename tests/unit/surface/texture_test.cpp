@@ -392,8 +392,7 @@ TEST(ImageReader, AnyNameIsAName) {
 TEST(ImageReader, SaysWhatIsWrong) {
   EXPECT_THAT(error_of(read_image("/no/such.png")),
               HasSubstr("/no/such.png: missing: expected an image file"));
-  EXPECT_THAT(error_of(read_image(testing::TempDir())),
-              HasSubstr("is a folder, expected a file"));
+  EXPECT_THAT(error_of(read_image(testing::TempDir())), HasSubstr("is a folder, expected a file"));
   const std::string text = write_test_file("text.png", "this is no image\n");
   EXPECT_THAT(error_of(read_image(text)), HasSubstr("text.png: not an image: "));
   const std::string cut =
