@@ -225,7 +225,7 @@ TEST(MeshLoader, UsesNormalsOfTheFile) {
 
 TEST(MeshLoader, ErrorsNameFileAndFault) {
   expect_error(testing::TempDir() + "nowhere.ply", "missing");
-  expect_error(testing::TempDir(), "no regular file");
+  expect_error(testing::TempDir(), "is a folder, expected a file");
   for (const std::string extension : {"off", "ply", "obj", "gltf", "glb"}) {
     const std::string expected = extension.starts_with("gl") ? "not a glTF file: " : "not a mesh: ";
     expect_error(write_test_file("garbage." + extension, "hello, this is no mesh\n"), expected);
