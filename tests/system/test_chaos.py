@@ -17,6 +17,7 @@ def a_power_cut_sees_what_it_might_take(programs, folder):
     """Blobs and frames get their names before the witness's eyes."""
     if not Path(programs.path("libsync_witness.so")).exists():
         return
+    folder.mkdir(parents=True, exist_ok=True)
     power = PowerCut(programs, folder)
     job = write_job(folder / "job.json", make_job(folder, frames="1-2"))
     subprocess.run([programs.path("baton"), "render", job, "--workers", "1", "--work-dir", folder / "work"], check=True,
