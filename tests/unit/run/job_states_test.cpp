@@ -35,7 +35,8 @@ MemorySharePtr room_for(std::size_t num_states) {
   return std::make_shared<MemoryShare>(num_states * state_of(10, false)->size_bytes());
 }
 
-// A pixel of `pool` takes 4 bytes and a block of 4 x 4 pixels 1024, beside 9 that every pixel takes.
+// A pixel of `pool` takes 4 bytes and a block of 4 x 4 pixels 1024, beside 9 that every pixel
+// takes.
 TEST(JobStates, CountsWhatStatesTake) {
   JobStates states(std::make_shared<MemoryShare>(1 << 20));
   states.keep(digest_of("pool"), state_of(10, true));
