@@ -33,12 +33,28 @@ struct BlockMemory {
 };
 static_assert(sizeof(BlockMemory) == 1024);
 
-/// The variance of a pixel's unshadowed light by candidates of either kind, the upper halves of
-/// floats (worker/sampling/light_noise.h). 0: nothing is known.
-struct PixelNoise {
-  std::uint16_t light = 0, lobes = 0;
+/// Rays of a pixel beside what its block expected of them, in 1 / kRay rays.
+struct RayTally {
+  static constexpr std::uint16_t kRay = 127;
+  static constexpr std::uint16_t kMost = 256 * kRay;  ///< past it both are halved
 
-  bool operator==(const PixelNoise&) const = default;
+  std::uint16_t expected = 0;  ///< sum of V^ as the block had it
+  std::uint16_t free = 0;      ///< rays that were
+
+  bool operator==(const RayTally&) const = default;
 };
+
+/// What a pixel remembers by itself.
+struct PixelMemory {
+  /// The variance of its unshadowed light by candidates of either kind, the upper half of a float
+  /// (worker/sampling/light_noise.h). 0: nothing is known.
+  std::uint16_t light_noise = 0, lobe_noise = 0;
+  /// Into the bins of the sky, and into those of lamps. A pixel in the shadow among others in the
+  /// light finds less than its block expects.
+  std::array<RayTally, 2> rays{};
+
+  bool operator==(const PixelMemory&) const = default;
+};
+static_assert(sizeof(PixelMemory) == 12);
 
 }  // namespace baton

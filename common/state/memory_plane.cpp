@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -17,7 +18,9 @@ constexpr BlockTags kBlockTags[] = {{{'B', 'L', 'K', 'M'}, {'B', 'L', 'K', 'C'}}
                                     {{'C', 'A', 'T', 'M'}, {'C', 'A', 'T', 'C'}}};
 constexpr SectionTag kLightNoise{'N', 'O', 'I', 'S'};
 constexpr SectionTag kLobeNoise{'N', 'O', 'I', 'L'};
+constexpr SectionTag kTallies{'T', 'L', 'L', 'Y'};
 constexpr std::size_t kNoiseStride = sizeof(std::uint16_t);
+constexpr std::size_t kTallyBytes = sizeof(PixelMemory::rays);
 
 /// Which bins of 64 have seen a ray: bit i is bin i.
 using BinMask = std::uint64_t;
@@ -110,7 +113,7 @@ Status decode_blocks(const StateReader& from, const BlockTags& tags, const Pixel
 std::vector<std::size_t> MemoryFormat::pixel_bytes(std::int32_t num_particles,
                                                    std::int32_t num_populations) const {
   std::vector<std::size_t> sizes = SampleFormat::pixel_bytes(num_particles, num_populations);
-  sizes.push_back(sizeof(PixelNoise));
+  sizes.push_back(sizeof(PixelMemory));
   return sizes;
 }
 
@@ -122,34 +125,54 @@ std::vector<SectionTag> MemoryFormat::tags() const {
   std::vector<SectionTag> tags = SampleFormat::tags();
   for (std::size_t plane = 0; plane < num_planes(); ++plane)
     tags.insert(tags.end(), {kBlockTags[plane].masks, kBlockTags[plane].cells});
-  tags.insert(tags.end(), {kLightNoise, kLobeNoise});
+  tags.insert(tags.end(), {kLightNoise, kLobeNoise, kTallies});
   return tags;
 }
 
 void MemoryFormat::encode(const SampleState& state, StateWriter& out) const {
   SampleFormat::encode(state, out);
   for (std::size_t plane = 0; plane < num_planes(); ++plane)
-    encode_blocks(memory_plane(state, plane == 1), kBlockTags[plane], out);
-  ByteWriter light_noise, lobe_noise;
-  const std::span<const PixelNoise> noises = noise_plane(state);
+    encode_blocks(block_memory_plane(state, plane == 1), kBlockTags[plane], out);
+  ByteWriter light_noise, lobe_noise, tallies;
+  const std::span<const PixelMemory> memories = pixel_memory_plane(state);
   for (const std::size_t pixel : out.pixels()) {
-    light_noise.put(noises[pixel].light);
-    lobe_noise.put(noises[pixel].lobes);
+    const PixelMemory& memory = memories[pixel];
+    light_noise.put(memory.light_noise);
+    lobe_noise.put(memory.lobe_noise);
+    for (const RayTally& rays : memory.rays) {
+      tallies.put(rays.expected);
+      tallies.put(rays.free);
+    }
   }
   out.add(kLightNoise, kNoiseStride, light_noise.take());
   out.add(kLobeNoise, kNoiseStride, lobe_noise.take());
+  out.add(kTallies, kNoiseStride, tallies.take());
 }
 
 Status MemoryFormat::decode(const StateReader& from, SampleState& state) const {
   BATON_TRY(SampleFormat::decode(from, state));
   for (std::size_t plane = 0; plane < num_planes(); ++plane) {
-    BATON_TRY(decode_blocks(from, kBlockTags[plane], state.rect, memory_plane(state, plane == 1)));
+    BATON_TRY(
+        decode_blocks(from, kBlockTags[plane], state.rect, block_memory_plane(state, plane == 1)));
   }
   BATON_ASSIGN(const Column light, noises_of(from, kLightNoise));
   BATON_ASSIGN(const Column lobes, noises_of(from, kLobeNoise));
-  const std::span<PixelNoise> noises = noise_plane(state);
-  for (std::size_t i = 0; i < from.pixels().size(); ++i)
-    noises[from.pixels()[i]] = {light.at<std::uint16_t>(i), lobes.at<std::uint16_t>(i)};
+  BATON_ASSIGN(const Column counts, column(from, kTallies, from.pixels().size() * kTallyBytes));
+  const std::span<PixelMemory> memories = pixel_memory_plane(state);
+  for (std::size_t i = 0; i < from.pixels().size(); ++i) {
+    PixelMemory& memory = memories[from.pixels()[i]];
+    memory.light_noise = light.at<std::uint16_t>(i);
+    memory.lobe_noise = lobes.at<std::uint16_t>(i);
+    for (std::size_t kind = 0; kind < memory.rays.size(); ++kind) {
+      RayTally& rays = memory.rays[kind];
+      rays = {counts.at<std::uint16_t>(4 * i + 2 * kind),
+              counts.at<std::uint16_t>(4 * i + 2 * kind + 1)};
+      if (const std::uint16_t most = std::max(rays.expected, rays.free); most > RayTally::kMost) {
+        return from.wrong_value(kTallies, from.pixels()[i],
+                                fmt::format("{}, expected at most {}", most, RayTally::kMost));
+      }
+    }
+  }
   return {};
 }
 
@@ -165,14 +188,14 @@ void MemoryFormat::inherit_block(std::span<const BlockSource> sources, SampleSta
     std::array<std::uint32_t, BlockMemory::kCount> seen{}, free{};
     for (const BlockSource& source : sources) {
       if (source.for_catchers != catchers) continue;
-      const BlockMemory& old = memory_plane(*source.state, catchers)[source.block];
+      const BlockMemory& old = block_memory_plane(*source.state, catchers)[source.block];
       const auto share = static_cast<std::uint32_t>(source.num_pixels) * (1u << 15) / of_all;
       for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
         seen[i] += share * old.cells[i].seen;
         free[i] += share * old.cells[i].free;
       }
     }
-    BlockMemory& memory = memory_plane(state, catchers)[block];
+    BlockMemory& memory = block_memory_plane(state, catchers)[block];
     for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
       memory.cells[i] = {static_cast<std::uint8_t>(seen[i] >> 16),
                          static_cast<std::uint8_t>(free[i] >> 16)};

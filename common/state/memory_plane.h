@@ -7,10 +7,10 @@
 
 namespace baton {
 
-/// What blocks of pixels remember of their rays, and pixels of the noise of their light, beside Lns
-/// and, if any, samples. In a file a block has the bins that have seen a ray. Where there are
-/// catchers of shadows, their pixels have a memory of their own in each block: objects must look
-/// the same without them.
+/// What blocks of pixels remember of their rays, and pixels of theirs and of the noise of their
+/// light, beside Lns and, if any, samples. In a file a block has the bins that have seen a ray.
+/// Where there are catchers of shadows, their pixels have a memory of their own in each block:
+/// objects must look the same without them.
 class MemoryFormat final : public SampleFormat {
  public:
   explicit MemoryFormat(bool has_catchers) : has_catchers_(has_catchers) {}
@@ -24,7 +24,7 @@ class MemoryFormat final : public SampleFormat {
   std::vector<SectionTag> tags() const override;
   void encode(const SampleState& state, StateWriter& out) const override;
   /// Errors, beside those of SampleFormat: more free rays in a bin than rays, a marked bin without
-  /// any, noise that is negative or not finite.
+  /// any, noise that is negative or not finite, counts past the most.
   Status decode(const StateReader& from, SampleState& state) const override;
   /// The mean of the sources, of which rays of then count half: they were seen from elsewhere, or
   /// past what has moved since.
@@ -39,19 +39,19 @@ class MemoryFormat final : public SampleFormat {
 const MemoryFormat& memory_format(bool has_catchers = false);
 
 /// (pixels) of a state of memory_format().
-inline std::span<PixelNoise> noise_plane(SampleState& state) {
-  return state.planes[SampleFormat::kNumPlanes].values<PixelNoise>();
+inline std::span<PixelMemory> pixel_memory_plane(SampleState& state) {
+  return state.planes[SampleFormat::kNumPlanes].values<PixelMemory>();
 }
-inline std::span<const PixelNoise> noise_plane(const SampleState& state) {
-  return state.planes[SampleFormat::kNumPlanes].values<PixelNoise>();
+inline std::span<const PixelMemory> pixel_memory_plane(const SampleState& state) {
+  return state.planes[SampleFormat::kNumPlanes].values<PixelMemory>();
 }
 
 /// (blocks) of a state of memory_format(), of the pixels that see a catcher or of the others.
-inline std::span<BlockMemory> memory_plane(SampleState& state, bool of_catchers = false) {
+inline std::span<BlockMemory> block_memory_plane(SampleState& state, bool of_catchers = false) {
   return state.block_planes[of_catchers ? 1 : 0].values<BlockMemory>();
 }
-inline std::span<const BlockMemory> memory_plane(const SampleState& state,
-                                                 bool of_catchers = false) {
+inline std::span<const BlockMemory> block_memory_plane(const SampleState& state,
+                                                       bool of_catchers = false) {
   return state.block_planes[of_catchers ? 1 : 0].values<BlockMemory>();
 }
 

@@ -63,9 +63,9 @@ SampleState small_state(const StateFormat& format, std::int32_t particles,
 SampleState state_with_memory() {
   SampleState state = small_state(memory_format(), 0, 1);
   for (std::size_t pixel = 1; pixel < state.num_pixels(); ++pixel)
-    noise_plane(state)[pixel].light = 0x3f80;
+    pixel_memory_plane(state)[pixel].light_noise = 0x3f80;
   for (std::size_t bin = 3; bin < BlockMemory::kCount; bin += 100)
-    memory_plane(state)[0].cells[bin] = {200, 30};
+    block_memory_plane(state)[0].cells[bin] = {200, 30};
   return state;
 }
 

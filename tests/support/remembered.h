@@ -26,13 +26,15 @@ inline float expected_visibility(const BlockMemory& memory, OctDirection code,
   using namespace HWY_NAMESPACE;
   const PoolTuning tuning;
   const VisibilityTable table = table_of(memory);
+  const PixelVisibility pixel(table);
   const auto bin = static_cast<std::int32_t>(visibility_bin(code, is_lamp));
-  return hn::GetLane(RememberedLanes(tuning, table).Look(hn::Set(DI(), bin)).expected);
+  return hn::GetLane(RememberedLanes(tuning, pixel).Look(hn::Set(DI(), bin)).expected);
 }
 
 inline void remember_ray(BlockMemory& memory, std::size_t bin, bool free) {
-  const auto number = static_cast<std::uint16_t>(bin);
-  remember_rays(memory, {&number, 1}, free ? 1 : 0);
+  const auto tag = static_cast<std::uint16_t>(bin);
+  PixelMemory pixel;
+  remember_rays({&tag, 1}, free ? 1 : 0, memory, pixel);
 }
 
 }  // namespace baton

@@ -64,7 +64,7 @@ void CastRays(const PixelRays& in, const SiteOrigins& origins, RayBatch& batch) 
     const VU number = CountFrom(du, static_cast<std::uint32_t>(i));
     hn::StoreU(number, du, batch.sample.data() + first + i);
   }
-  std::copy_n(in.bin.from(0), in.count, batch.tag.data() + first);
+  std::copy_n(in.tag.from(0), in.count, batch.tag.data() + first);
   rays.extend(first + in.count);
 }
 

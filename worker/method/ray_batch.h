@@ -21,7 +21,7 @@ struct RayBatch {
   std::vector<std::uint32_t> sample;  ///< number of the sample in its pixel
   std::vector<float> r, g, b;         ///< u_j (f cos L)_rgb / p~
   std::vector<float> visibility;      ///< share of the pixel's Lns
-  /// Handed back to the method: PixelRays::bin.
+  /// Handed back to the method: PixelRays::tag.
   std::vector<std::uint16_t> tag;
 
   void clear() {

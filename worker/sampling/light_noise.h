@@ -29,23 +29,23 @@ struct LightVariance {
   float from_lobes = 0;  ///< candidates from glossy lobes
 };
 
-inline LightVariance light_variance(const PixelNoise& noise) {
+inline LightVariance light_variance(const PixelMemory& memory) {
   const auto of = [](std::uint16_t upper_half) {
     return std::bit_cast<float>(std::uint32_t{upper_half} << 16);
   };
-  return {of(noise.light), of(noise.lobes)};
+  return {of(memory.light_noise), of(memory.lobe_noise)};
 }
 
 /// Enters what a frame saw, finite and >= 0.
 inline void remember_light_variance(const PoolTuning& tuning, const LightVariance& seen,
-                                    PixelNoise& noise) {
-  const LightVariance known = light_variance(noise);
+                                    PixelMemory& memory) {
+  const LightVariance known = light_variance(memory);
   const auto mean = [&](float before, float now) {
     const float sum = before > 0 ? before + tuning.new_frame * (now - before) : now;
     return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(sum) >> 16);
   };
-  noise.light = mean(known.from_light, seen.from_light);
-  noise.lobes = mean(known.from_lobes, seen.from_lobes);
+  memory.light_noise = mean(known.from_light, seen.from_light);
+  memory.lobe_noise = mean(known.from_lobes, seen.from_lobes);
 }
 
 /// Candidates of a kind: the usual number where that leaves the usual noise, else in proportion to

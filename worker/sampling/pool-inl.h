@@ -54,18 +54,29 @@ struct ProspectLanes {
 /// V^ of bins, as the rounds before have left it.
 class RememberedLanes {
  public:
-  RememberedLanes(const PoolTuning& tuning, const VisibilityTable& table)
+  RememberedLanes(const PoolTuning& tuning, const PixelVisibility& memory)
       : tuning_(tuning),
-        expected_(table.is_uniform ? nullptr : table.expected.data()),
-        everywhere_(Prospect(hn::Set(DF(), table.everywhere))) {}
+        of_block_(memory.of_block.is_uniform ? nullptr : memory.of_block.expected.data()),
+        share_(memory.share),
+        everywhere_(Prospect(hn::Set(DF(), memory.of_block.everywhere))) {}
 
   HWY_INLINE ProspectLanes Look(VI bin) const {
-    if (expected_ == nullptr)
+    if (of_block_ == nullptr)
       return {everywhere_.expected, everywhere_.contribution, everywhere_.deviation};
-    return Prospect(hn::GatherIndex(DF(), expected_, bin));
+    return Prospect(OfPixel(bin, OfBlock(bin)));
   }
-  HWY_INLINE VF Expected(VI bin) const {
-    return expected_ == nullptr ? everywhere_.expected : hn::GatherIndex(DF(), expected_, bin);
+  /// V^ as the block has it.
+  HWY_INLINE VF OfBlock(VI bin) const {
+    return of_block_ == nullptr ? everywhere_.expected : hn::GatherIndex(DF(), of_block_, bin);
+  }
+  /// V^, where the block has of_block. A block whose rays have always agreed knows its pixels.
+  HWY_INLINE VF OfPixel(VI bin, VF of_block) const {
+    if (of_block_ == nullptr) return of_block;
+    const DF d;
+    const auto is_lamp = hn::RebindMask(
+        d, hn::Gt(bin, hn::Set(DI(), static_cast<std::int32_t>(BlockMemory::kBins) - 1)));
+    const VF share = hn::IfThenElse(is_lamp, hn::Set(d, share_[1]), hn::Set(d, share_[0]));
+    return hn::Min(hn::Mul(of_block, share), hn::Set(d, kMostVisible));
   }
 
  private:
@@ -73,7 +84,8 @@ class RememberedLanes {
     return {expected, ContributionFactor(tuning_, expected), DeviationFactor(tuning_, expected)};
   }
   const PoolTuning& tuning_;
-  const float* expected_;  ///< by bin; null: the same everywhere
+  const float* of_block_;  ///< by bin; null: the same everywhere
+  std::array<float, 2> share_;
   ProspectLanes everywhere_;
 };
 
@@ -163,7 +175,8 @@ HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const
     const auto c = chosen.Evaluate(pick);
     const Vec3Lanes w = DecodeOctahedral(c.code);
     const VI bin = hn::GatherIndex(di, bin_of, pick);
-    const VF seen = remembered.Expected(bin);
+    const VF of_block = remembered.OfBlock(bin);
+    const VF seen = remembered.OfPixel(bin, of_block);
     const VF light =
         hn::Div(hn::Mul(per_pick, hn::Load(d, picks.times.from(j))),
                 plan.control ? DeviationFactor(tuning, seen) : ContributionFactor(tuning, seen));
@@ -171,7 +184,10 @@ HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const
     const VF share = hn::Mul(light, per_light);
     StoreRays(w, color, share, c.site, j, out);
     const hn::Rebind<std::uint16_t, DI> du16;
-    hn::StoreU(hn::DemoteTo(du16, bin), du16, out.bin.from(j));
+    const VI expected_q = hn::ConvertTo(
+        di, hn::MulAdd(of_block, hn::Set(d, float{RayTally::kRay}), hn::Set(d, 0.5f)));
+    const VI tag = hn::Or(bin, hn::ShiftLeft<RayTag::kBinBits>(expected_q));
+    hn::StoreU(hn::DemoteTo(du16, tag), du16, out.tag.from(j));
     const Vec3Lanes sure = Scale(color, seen);
     expected = HWY_NAMESPACE::Add(expected, sure);
     expected_share = hn::MulAdd(share, seen, expected_share);
@@ -192,7 +208,7 @@ HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const
 /// and finite, out stays empty.
 template <class Candidates>
 HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates, float u,
-                          std::int32_t num_rays, const VisibilityTable& memory, PoolLines& scratch,
+                          std::int32_t num_rays, const PixelVisibility& memory, PoolLines& scratch,
                           PixelRays& out) {
   const DF d;
   const auto sum = [&](VF v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
@@ -214,11 +230,12 @@ HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates
   const float expected = mean(visible);
   const bool control = use_control(tuning, expected, total_deviation);
   const float scale = noise_scale(tuning, expected, candidates.mean_radiance);
-  const RayPlan plan{
-      control ? deviation : contribution, control ? total_deviation : contribution.Finish(),
-      control,
-      memory.knows_rays ? rays_for_deviation(tuning, num_rays, total_deviation, scale) : num_rays,
-      lns};
+  const RayPlan plan{control ? deviation : contribution,
+                     control ? total_deviation : contribution.Finish(), control,
+                     memory.of_block.knows_rays
+                         ? rays_for_deviation(tuning, num_rays, total_deviation, scale)
+                         : num_rays,
+                     lns};
   out.light_variance = {VarianceOfOne(lines.light_bends, candidates.from_light, scale),
                         VarianceOfOne(lines.bends, candidates.from_bsdf, scale)};
   if (control) out.constant = {visible, expected / lns};

@@ -85,16 +85,37 @@ void VisibilityTable::read(const BlockMemory& memory, float prior_rays) {
   of_lamps.expect(lamps, prior_rays, guess, expected.data() + BlockMemory::kBins);
 }
 
-void remember_rays(BlockMemory& memory, std::span<const std::uint16_t> bin, std::uint64_t free) {
-  BATON_CHECK(bin.size() <= 64);
-  for (std::size_t j = 0; j < bin.size(); ++j) {
-    VisibilityCell& cell = memory.cells[bin[j]];
+PixelVisibility::PixelVisibility(const VisibilityTable& block, const PixelMemory& own,
+                                 float prior_rays)
+    : of_block(block) {
+  const float prior = prior_rays * RayTally::kRay;
+  for (std::size_t kind = 0; kind < share.size(); ++kind) {
+    const RayTally& rays = own.rays[kind];
+    share[kind] = (rays.free + prior) / (rays.expected + prior);
+  }
+}
+
+void remember_rays(std::span<const std::uint16_t> tag, std::uint64_t free, BlockMemory& block,
+                   PixelMemory& pixel) {
+  BATON_CHECK(tag.size() <= 64);
+  for (std::size_t j = 0; j < tag.size(); ++j) {
+    const RayTag ray{tag[j]};
+    const bool is_free = (free >> j & 1) != 0;
+    VisibilityCell& cell = block.cells[ray.bin()];
     if (cell.seen == VisibilityCell::kMostSeen) {
       cell.seen /= 2;
       cell.free /= 2;
     }
     ++cell.seen;
-    cell.free = static_cast<std::uint8_t>(cell.free + (free >> j & 1));
+    cell.free = static_cast<std::uint8_t>(cell.free + (is_free ? 1 : 0));
+
+    RayTally& own = pixel.rays[ray.bin() / BlockMemory::kBins];
+    own.expected = static_cast<std::uint16_t>(own.expected + ray.expected());
+    own.free = static_cast<std::uint16_t>(own.free + (is_free ? RayTally::kRay : 0));
+    if (std::max(own.expected, own.free) > RayTally::kMost) {
+      own.expected /= 2;
+      own.free /= 2;
+    }
   }
 }
 

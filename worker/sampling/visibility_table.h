@@ -31,8 +31,33 @@ struct VisibilityTable {
   void read(const BlockMemory& memory, float prior_rays);
 };
 
-/// Enters traced rays into a block's memory: ray j in bin[j], free where bit j of `free` is set; at
-/// most 64. A bin whose counts are full goes on with half of them.
-void remember_rays(BlockMemory& memory, std::span<const std::uint16_t> bin, std::uint64_t free);
+/// V^ of a pixel: its block's, in proportion to what its own rays have found beside that.
+struct PixelVisibility {
+  const VisibilityTable& of_block;
+  /// Factors on V^ of the sky's bins, and of lamps'.
+  std::array<float, 2> share{1, 1};
+
+  explicit PixelVisibility(const VisibilityTable& block) : of_block(block) {}
+  /// prior_rays: what the block's word counts beside the pixel's own rays, > 0.
+  PixelVisibility(const VisibilityTable& block, const PixelMemory& own, float prior_rays);
+};
+/// The most that a pixel expects: nothing is certain.
+inline constexpr float kMostVisible = 1 - 1.0f / 1024;
+
+/// A ray as it is remembered: the bin of its direction, and V^ of the block there.
+struct RayTag {
+  static constexpr int kBinBits = 9;
+  static_assert(std::size_t{1} << kBinBits == BlockMemory::kCount);
+
+  std::uint16_t value;
+  std::size_t bin() const { return value & ((1u << kBinBits) - 1); }
+  /// In 1 / RayTally::kRay.
+  std::uint16_t expected() const { return static_cast<std::uint16_t>(value >> kBinBits); }
+};
+
+/// Enters traced rays, at most 64, into what a block remembers and into what its pixel does: ray j
+/// has tag[j] and was free where bit j of `free` is set. Full counts go on with half of them.
+void remember_rays(std::span<const std::uint16_t> tag, std::uint64_t free, BlockMemory& block,
+                   PixelMemory& pixel);
 
 }  // namespace baton

@@ -35,11 +35,11 @@ TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16);
   EXPECT_EQ(estimate_job(job).state_bytes, 153 * 5000);
   job.sampling.method = Method::pool;
-  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 4);
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 12);
   EXPECT_EQ(estimate_job(job).state_bytes_per_block, 1024 + 64);
   EXPECT_EQ(
       estimate_job(job).state_bytes,
-      13 * 5000 + 1088 * static_cast<std::int64_t>(PixelBlocks(job.image.rendered()).count()));
+      21 * 5000 + 1088 * static_cast<std::int64_t>(PixelBlocks(job.image.rendered()).count()));
   job.sampling.method = Method::restir;
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16 + 2);
   for (const Method method : {Method::bidirectional, Method::ratio}) {

@@ -71,7 +71,7 @@ class PoolRays : public OnInstructionSet {
   float choose(const SiteBlock& sites, const BlockMemory& memory, float u) {
     return kernels::choose_pool_rays(tuning,
                                      {sites, view, presampled, counts(sites), rng.bits(0, 0)}, u,
-                                     16, table_of(memory), *scratch, *rays);
+                                     16, PixelVisibility(table_of(memory)), *scratch, *rays);
   }
   Vec3 direction(std::size_t j) const { return {rays->x[j], rays->y[j], rays->z[j]}; }
   static CandidateCounts counts(const SiteBlock& sites) {
@@ -97,7 +97,8 @@ class PoolRays : public OnInstructionSet {
       seen += candidates->weight[i];
     }
     for (const std::uint32_t remembered : {0u, 3u, 3000u}) {
-      const VisibilityTable memory = table_of(memory_after(remembered));
+      const VisibilityTable table = table_of(memory_after(remembered));
+      const PixelVisibility memory(table);
       double sum[4] = {};
       for (int k = 0; k < num_offsets; ++k) {
         const float u = (static_cast<float>(k) + 0.5f) / static_cast<float>(num_offsets);
@@ -155,7 +156,7 @@ TEST_P(PoolRays, ReadTheMemoryAlikeOnEverySet) {
               visibility_bin(candidates->code[i]));
   }
   for (std::size_t j = 0; j < rays->count; ++j) {
-    EXPECT_EQ(rays->bin[j], visibility_bin(encode_octahedral(direction(j))));
+    EXPECT_EQ(RayTag{rays->tag[j]}.bin(), visibility_bin(encode_octahedral(direction(j))));
   }
 }
 
@@ -166,7 +167,8 @@ TEST_P(PoolRays, TellTheVarianceOfTheirLight) {
   const PresampledLight one_run = presample_light(light, light, 3, 2, {.one_run = true});
   for (const bool glossy : {false, true}) {
     const SiteBlock sites = pixel(glossy);
-    const VisibilityTable memory = table_of({});
+    const VisibilityTable table = table_of({});
+    const PixelVisibility memory(table);
     double sum = 0, squares = 0, variance = 0;
     constexpr int kRuns = 2000;
     for (std::uint32_t k = 0; k < kRuns; ++k) {
@@ -195,9 +197,10 @@ TEST_P(PoolRays, JudgeNoiseBesideTheLightThatTheyExpect) {
   const SiteBlock sites = pixel(true);
   const auto judged = [&](std::uint16_t share) {
     const float expected = (static_cast<float>(share) + 0.5f) / 4096;
-    VisibilityTable memory;
-    memory.everywhere = expected;
-    memory.knows_rays = true;
+    VisibilityTable table;
+    table.everywhere = expected;
+    table.knows_rays = true;
+    const PixelVisibility memory(table);
     const float lns =
         kernels::choose_pool_rays(tuning, {sites, view, presampled, counts(sites), rng.bits(0, 0)},
                                   0.5f, 16, memory, *scratch, *rays);
@@ -213,7 +216,7 @@ TEST_P(PoolRays, AreNWithoutAMemoryAndByDeviationWithOne) {
   const auto num_rays = [&](const BlockMemory& memory) {
     kernels::choose_pool_rays(tuning,
                               {sites, view, presampled, {.from_light = 400}, rng.bits(0, 0)}, 0.5f,
-                              16, table_of(memory), *scratch, *rays);
+                              16, PixelVisibility(table_of(memory)), *scratch, *rays);
     return rays->count;  // less what was chosen twice
   };
   EXPECT_LE(num_rays(memory_after(0)), 16u);
@@ -232,7 +235,7 @@ TEST_P(PoolRays, AreNoneWithoutLight) {
   const PresampledLight none = presample_light(dark, dark, 1, 1);
   EXPECT_EQ(kernels::choose_pool_rays(
                 tuning, {sites, view_of(dark), none, {.from_light = 8}, rng.bits(0, 0)}, 0.5f, 16,
-                table_of(memory_after(10)), *scratch, *rays),
+                PixelVisibility(table_of(memory_after(10))), *scratch, *rays),
             0);
   EXPECT_EQ(rays->count, 0u);
 }

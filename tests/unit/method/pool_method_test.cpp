@@ -86,8 +86,8 @@ class PoolCounts : public testing::Test {
   std::int32_t sample(const FrameLight& light, const SiteBlock& sites, std::int32_t num_candidates,
                       const LightVariance& known) {
     OnePixel pixel(spec_of(num_candidates), true);
-    remember_ray(memory_plane(pixel.state)[0], 0, true);
-    remember_light_variance(PoolTuning{}, known, noise_plane(pixel.state)[0]);
+    remember_ray(block_memory_plane(pixel.state)[0], 0, true);
+    remember_light_variance(PoolTuning{}, known, pixel_memory_plane(pixel.state)[0]);
     const PixelDiagnostics did = pixel.sample(light, sites, 0);
     seen_ = pixel.sampler->light_variance_seen();
     return did.target_evaluations;

@@ -35,14 +35,14 @@ MemorySharePtr room_for(std::size_t num_states) {
   return std::make_shared<MemoryShare>(num_states * state_of(10, false)->size_bytes());
 }
 
-// A pixel of `pool` takes 4 bytes and a block of 4 x 4 pixels 1024, beside 9 that every pixel
+// A pixel of `pool` takes 12 bytes and a block of 4 x 4 pixels 1024, beside 9 that every pixel
 // takes.
 TEST(JobStates, CountsWhatStatesTake) {
   JobStates states(std::make_shared<MemoryShare>(1 << 20));
   states.keep(digest_of("pool"), state_of(10, true));
-  EXPECT_EQ(states.size_bytes(), 100u * (9 + 4) + 9 * sizeof(BlockMemory));
+  EXPECT_EQ(states.size_bytes(), 100u * (9 + 12) + 9 * sizeof(BlockMemory));
   states.keep(digest_of("sequential"), state_of(10, false));
-  EXPECT_EQ(states.size_bytes(), 100u * (9 + 4 + 9 + 16 * 9) + 9 * sizeof(BlockMemory));
+  EXPECT_EQ(states.size_bytes(), 100u * (9 + 12 + 9 + 16 * 9) + 9 * sizeof(BlockMemory));
 }
 
 // What does not fit is not held: it goes into the store instead.

@@ -114,7 +114,7 @@ class PoolChain {
 
   FrameEstimate step(const StateValues& now) {
     // Draw candidates. The fault: their number is decided by what the first of them show.
-    float known = light_variance(noise_).from_light;
+    float known = light_variance(own_).from_light;
     if (fault_ == Fault::candidates_by_noise_of_this_frame) {
       const std::uint32_t begin = count_;
       draw(now, kCandidates);
@@ -129,7 +129,7 @@ class PoolChain {
     most_candidates = std::max(most_candidates, count);
 
     // Choose rays and trace them.
-    BlockMemory learnt = memory_;
+    Memory learnt{memory_, own_};
     table_.read(memory_, kTuning.prior_rays);
     FrameEstimate e{.lns = choose(uniform())};
     if (space_.rays.count == 0) return e;
@@ -141,12 +141,17 @@ class PoolChain {
       choose(uniform());
       e.image = (e.image + trace(learnt, first_is_free)) / 2;
     }
-    memory_ = learnt;
-    remember_light_variance(kTuning, seen, noise_);
+    memory_ = learnt.block;
+    own_ = learnt.own;
+    remember_light_variance(kTuning, seen, own_);
     return e;
   }
 
  private:
+  struct Memory {
+    BlockMemory block;
+    PixelMemory own;
+  };
   /// Rays and candidates get fewer and more in this space.
   static constexpr PoolTuning kTuning{
       .surroundings = 3, .control_from = 2, .usual_deviation = 0.05f, .light = {0.03f, 0.75f}};
@@ -174,10 +179,12 @@ class PoolChain {
       candidates.found.clear();
     }
     space_.rays.clear();
-    return double{PoolStep(kTuning, candidates, u, kRays, table_, space_.lines, space_.rays)};
+    return double{PoolStep(kTuning, candidates, u, kRays,
+                           PixelVisibility(table_, own_, kTuning.own_prior_rays), space_.lines,
+                           space_.rays)};
   }
   /// Traces the chosen rays and learns from them; returns the pixel.
-  double trace(BlockMemory& learnt, bool& first_is_free) {
+  double trace(Memory& learnt, bool& first_is_free) {
     const PixelRays& rays = space_.rays;
     (rays.constant.visibility != 0 ? with_control : without_control) += 1;
     fewest_rays = std::min(fewest_rays, rays.count);
@@ -186,11 +193,12 @@ class PoolChain {
     std::uint64_t free = 0;
     for (std::size_t j = 0; j < rays.count; ++j) {
       const std::vector<bool>& found = space_.candidates.found;
-      const bool outcome = found.empty() ? is_free(state_of_bin(rays.bin[j])) : found[j];
+      const bool outcome =
+          found.empty() ? is_free(state_of_bin(RayTag{rays.tag[j]}.bin())) : found[j];
       if (outcome) free |= std::uint64_t{1} << j;
       if (outcome) sum += rays.r[j];
     }
-    remember_rays(learnt, rays.bin.first(rays.count), free);
+    remember_rays(rays.tag.first(rays.count), free, learnt.block, learnt.own);
     first_is_free = (free & 1) != 0;
     return sum;
   }
@@ -200,7 +208,7 @@ class PoolChain {
   Fault fault_;
   std::uint32_t count_ = 0;
   BlockMemory memory_;
-  PixelNoise noise_;
+  PixelMemory own_;
   VisibilityTable table_;
 };
 

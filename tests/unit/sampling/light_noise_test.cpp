@@ -7,7 +7,7 @@ namespace {
 
 constexpr PoolTuning kTuning;
 
-void remember(PixelNoise& memory, const LightVariance& seen) {
+void remember(PixelMemory& memory, const LightVariance& seen) {
   remember_light_variance(kTuning, seen, memory);
 }
 std::int32_t of_light(std::int32_t usual_number, float variance) {
@@ -15,14 +15,14 @@ std::int32_t of_light(std::int32_t usual_number, float variance) {
 }
 
 TEST(LightNoise, IsUnknownAtFirst) {
-  const PixelNoise memory;
+  const PixelMemory memory;
   EXPECT_EQ(light_variance(memory).from_light, 0.0f);
   EXPECT_EQ(light_variance(memory).from_lobes, 0.0f);
   EXPECT_EQ(of_light(100, 0), 100);
 }
 
 TEST(LightNoise, IsAMeanThatForgets) {
-  PixelNoise memory;
+  PixelMemory memory;
   remember(memory, {0.5f, 0});
   EXPECT_EQ(light_variance(memory).from_light, 0.5f) << "the first says it all";
   remember(memory, {8.5f, 3});

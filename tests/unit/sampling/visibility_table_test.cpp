@@ -103,10 +103,53 @@ TEST(RememberRays, TakesSixtyFourAtOnce) {
   std::vector<std::uint16_t> bins(64);
   for (std::size_t i = 0; i < 64; ++i) bins[i] = static_cast<std::uint16_t>(i % 3 + 300);
   BlockMemory memory;
-  remember_rays(memory, bins, 0x8000000000000001u);
+  PixelMemory pixel;
+  remember_rays(bins, 0x8000000000000001u, memory, pixel);
   EXPECT_EQ(memory.cells[300], (VisibilityCell{22, 2}));
   EXPECT_EQ(memory.cells[301], (VisibilityCell{21, 0}));
   EXPECT_EQ(memory.cells[302], (VisibilityCell{21, 0}));
+}
+
+/// A ray of which the block expects V^ in 1 / RayTally::kRay.
+std::uint16_t tag_of(std::size_t bin, unsigned expected) {
+  return static_cast<std::uint16_t>(bin | expected << RayTag::kBinBits);
+}
+
+// The block is in the light, one of its pixels is not.
+TEST(PixelVisibility, IsWhatOwnRaysFoundBesideTheBlock) {
+  BlockMemory block;
+  for (int i = 0; i < 200; ++i) remember_ray(block, 7, i % 10 != 0);
+  PixelMemory dark, bright;
+  for (int i = 0; i < 10; ++i) {
+    const std::uint16_t tag[] = {tag_of(7, 114)};
+    remember_rays(tag, 0, block, dark);
+    remember_rays(tag, 1, block, bright);
+  }
+  const VisibilityTable table = table_of(block);
+  const PixelVisibility of_dark(table, dark, 6), of_bright(table, bright, 6);
+  EXPECT_NEAR(of_dark.share[0], 6 / (6 + 10 * 114.0 / 127), 1e-4);
+  EXPECT_NEAR(of_bright.share[0], (6 + 10) / (6 + 10 * 114.0 / 127), 1e-4);
+  EXPECT_EQ(of_dark.share[1], 1.0f) << "of lamps it knows nothing";
+  for (int i = 0; i < 5000; ++i) {
+    const std::uint16_t tag[] = {tag_of(7, 114)};
+    remember_rays(tag, 0, block, dark);
+  }
+  EXPECT_LT(PixelVisibility(table, dark, 6).share[0], 0.06f);
+  EXPECT_LE(dark.rays[0].expected, RayTally::kMost);
+}
+
+// However much more light a pixel finds than its block, nothing is certain.
+TEST(PixelVisibility, IsNeverCertain) {
+  using namespace HWY_NAMESPACE;
+  BlockMemory block;
+  for (int i = 0; i < 200; ++i) remember_ray(block, 7, i % 2 == 0);
+  PixelMemory own;
+  own.rays[0] = {100, RayTally::kMost};
+  const VisibilityTable table = table_of(block);
+  const PixelVisibility pixel(table, own, 6);
+  const PoolTuning tuning;
+  EXPECT_EQ(hn::GetLane(RememberedLanes(tuning, pixel).Look(hn::Set(DI(), 7)).expected),
+            kMostVisible);
 }
 
 }  // namespace

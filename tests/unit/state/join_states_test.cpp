@@ -32,9 +32,9 @@ SampleState state_of(const StateFormat& format, const PixelRect& rect, std::int3
         samples.site[p] = static_cast<std::uint8_t>(random() % 16);
       }
       if (&format == &memory_format()) {
-        noise_plane(state)[i].light = static_cast<std::uint16_t>(random() % 0x7F80);
+        pixel_memory_plane(state)[i].light_noise = static_cast<std::uint16_t>(random() % 0x7F80);
         // Of the block: whatever part of it the tile has.
-        VisibilityCell& cell = memory_plane(state)[PixelBlocks(rect).at(x, y)].cells[9];
+        VisibilityCell& cell = block_memory_plane(state)[PixelBlocks(rect).at(x, y)].cells[9];
         cell.seen = static_cast<std::uint8_t>(1 + y / 4 * 10 + x / 4);
       }
       if (&format == &weighed_sample_format())

@@ -17,10 +17,11 @@ SampleState remembering_state(std::int32_t num_particles = 2) {
   SampleState state = tiny_state();
   state.resize(memory_format(), {2, 0, 5, 1}, num_particles);
   state.source[1] = state.source[2] = PixelSource::carried;
-  noise_plane(state)[1].lobes = 0x3C01;
-  noise_plane(state)[2].light = 0x3B12;
-  memory_plane(state)[1].cells[5] = {12, 3};
-  memory_plane(state)[1].cells[BlockMemory::kCount - 1] = {255, 255};
+  pixel_memory_plane(state)[1].lobe_noise = 0x3C01;
+  pixel_memory_plane(state)[1].rays[1] = {500, RayTally::kMost};
+  pixel_memory_plane(state)[2].light_noise = 0x3B12;
+  block_memory_plane(state)[1].cells[5] = {12, 3};
+  block_memory_plane(state)[1].cells[BlockMemory::kCount - 1] = {255, 255};
   return state;
 }
 
@@ -32,7 +33,7 @@ TEST(SampleState, RemembersRays) {
 TEST(SampleState, RemembersEveryBin) {
   SampleState state = remembering_state();
   for (const std::size_t step : {1, 2, 3, 31, 63, 511}) {
-    BlockMemory& memory = memory_plane(state)[0];
+    BlockMemory& memory = block_memory_plane(state)[0];
     memory = {};
     for (std::size_t bin = 0; bin < BlockMemory::kCount; bin += step)
       memory.cells[bin] = {static_cast<std::uint8_t>(1 + bin % 255), 1};
@@ -85,8 +86,8 @@ TEST(SampleState, RemembersRaysOfCatchersApart) {
   SampleState state = remembering_state();
   state.resize(memory_format(true), state.rect, 0);
   state.source[1] = PixelSource::catcher;
-  memory_plane(state, true)[1].cells[9] = {7, 7};
-  memory_plane(state)[0].cells[8] = {3, 0};
+  block_memory_plane(state, true)[1].cells[9] = {7, 7};
+  block_memory_plane(state)[0].cells[8] = {3, 0};
   EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
 }
 
@@ -104,26 +105,35 @@ TEST(SampleState, RefusesCountsThatCannotBe) {
 TEST(MemoryFormat, ABlockInheritsHalfOfTheMeanOfItsSources) {
   SampleState old;
   old.resize(memory_format(), {0, 0, 8, 4}, 0);
-  memory_plane(old)[0].cells[7] = {100, 60};
-  memory_plane(old)[1].cells[7] = {20, 20};
-  memory_plane(old)[1].cells[300] = {255, 1};
+  block_memory_plane(old)[0].cells[7] = {100, 60};
+  block_memory_plane(old)[1].cells[7] = {20, 20};
+  block_memory_plane(old)[1].cells[300] = {255, 1};
   SampleState now;
   now.resize(memory_format(), {0, 0, 4, 4}, 0);
   const StateFormat::BlockSource sources[] = {{&old, 0, false, 3}, {&old, 1, false, 1}};
   memory_format().inherit_block(sources, now, 0);
-  EXPECT_EQ(memory_plane(now)[0].cells[7], (VisibilityCell{40, 25}));
-  EXPECT_EQ(memory_plane(now)[0].cells[300], (VisibilityCell{31, 0}));
-  EXPECT_EQ(memory_plane(now)[0].cells[8], VisibilityCell());
+  EXPECT_EQ(block_memory_plane(now)[0].cells[7], (VisibilityCell{40, 25}));
+  EXPECT_EQ(block_memory_plane(now)[0].cells[300], (VisibilityCell{31, 0}));
+  EXPECT_EQ(block_memory_plane(now)[0].cells[8], VisibilityCell());
+}
+
+TEST(SampleState, RefusesTalliesPastTheMost) {
+  SampleState state = remembering_state();
+  pixel_memory_plane(state)[2].rays[0].expected = RayTally::kMost + 1;
+  const auto decoded = decode_state(encode_state(state), "a.bst");
+  ASSERT_FALSE(decoded.ok());
+  EXPECT_THAT(decoded.error().message,
+              HasSubstr("a.bst: section TLLY: pixel (4, 0): 32513, expected at most 32512"));
 }
 
 TEST(SampleState, RefusesNoiseThatIsNoNumber) {
-  const std::pair<std::uint16_t PixelNoise::*, const char*> kinds[] = {
-      {&PixelNoise::light, "NOIS"}, {&PixelNoise::lobes, "NOIL"}};
+  const std::pair<std::uint16_t PixelMemory::*, const char*> kinds[] = {
+      {&PixelMemory::light_noise, "NOIS"}, {&PixelMemory::lobe_noise, "NOIL"}};
   for (const auto& [kind, section] : kinds) {
     for (const std::uint16_t noise :
          {std::uint16_t{0x7F80}, std::uint16_t{0x8001}}) {  // infinite, negative
       SampleState state = remembering_state();
-      noise_plane(state)[2].*kind = noise;
+      pixel_memory_plane(state)[2].*kind = noise;
       const auto decoded = decode_state(encode_state(state), "a.bst");
       ASSERT_FALSE(decoded.ok());
       EXPECT_THAT(decoded.error().message,

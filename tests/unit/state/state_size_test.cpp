@@ -19,7 +19,7 @@ struct Carrying {
 const Carrying kCarrying[] = {
     {Method::sequential, sample_format(), 2 * 9 + 6 * 9},
     {Method::restir, weighed_sample_format(), 2 * 9 + 6 * 9 + 2},
-    {Method::pool, memory_format(), 2 * 9 + 6 * 9 + sizeof(PixelNoise)},
+    {Method::pool, memory_format(), 2 * 9 + 6 * 9 + sizeof(PixelMemory)},
 };
 
 TEST(SampleState, SizeOfAPixelIsThatOfItsPlanes) {

@@ -28,7 +28,7 @@ struct PixelCandidates {
 };
 
 inline float ChoosePoolRays(const PoolTuning& tuning, const kernels::CandidateSource& from, float u,
-                            std::int32_t num_rays, const VisibilityTable& memory,
+                            std::int32_t num_rays, const PixelVisibility& memory,
                             kernels::PoolScratch& scratch, PixelRays& out) {
   const PixelCandidates candidates{from, scratch.from_bsdf};
   return PoolStep(tuning, candidates, u, num_rays, memory, scratch.lines, out);
@@ -44,7 +44,7 @@ HWY_EXPORT(ChoosePoolRays);
 namespace kernels {
 
 float choose_pool_rays(const PoolTuning& tuning, const CandidateSource& from, float u,
-                       std::int32_t num_rays, const VisibilityTable& memory, PoolScratch& scratch,
+                       std::int32_t num_rays, const PixelVisibility& memory, PoolScratch& scratch,
                        PixelRays& out) {
   check_source(from);
   BATON_CHECK(num_rays >= 1 && num_rays <= static_cast<std::int32_t>(limits::kMaxParticles));

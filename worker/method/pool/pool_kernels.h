@@ -17,7 +17,7 @@ struct PoolScratch {
 /// sampling/pool-inl.h, which says what u, num_rays, memory and the answer are. num_rays: N,
 /// [1, kMaxParticles].
 float choose_pool_rays(const PoolTuning& tuning, const CandidateSource& from, float u,
-                       std::int32_t num_rays, const VisibilityTable& memory, PoolScratch& scratch,
+                       std::int32_t num_rays, const PixelVisibility& memory, PoolScratch& scratch,
                        PixelRays& out);
 
 }  // namespace baton::kernels

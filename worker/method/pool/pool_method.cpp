@@ -53,7 +53,7 @@ PixelMethod make_pool_method(const JobSpec& job, const PoolTuning& tuning) {
 const VisibilityTable& PoolSampler::table_of(const PixelState& pixel, bool sees_catcher) {
   const std::pair wanted(PixelBlocks(pixel.tile.rect).of(pixel.index), sees_catcher);
   if (!has_table_ || wanted != table_is_of_) {
-    table_.read(memory_plane(pixel.tile, sees_catcher)[wanted.first], tuning_.prior_rays);
+    table_.read(block_memory_plane(pixel.tile, sees_catcher)[wanted.first], tuning_.prior_rays);
     table_is_of_ = wanted;
     has_table_ = true;
   }
@@ -68,7 +68,7 @@ void PoolSampler::look_ahead(const RoundLight& /*light*/, bool /*has_history*/,
   const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
   if (has_table_ && block == table_is_of_.first) return;
   const auto* const bytes =
-      reinterpret_cast<const std::byte*>(&std::as_const(memory_plane(pixel.tile)[block]));
+      reinterpret_cast<const std::byte*>(&std::as_const(block_memory_plane(pixel.tile)[block]));
   for (std::size_t at = 0; at < sizeof(BlockMemory); at += 64) __builtin_prefetch(bytes + at);
 }
 
@@ -77,13 +77,15 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, const PixelState& 
   static const VisibilityTable kNothing{};
   poison(scratch_);
   poison(rays_);
-  PixelNoise* const own = remembers_ ? &noise_plane(pixel.tile)[pixel.index] : nullptr;
+  static const PixelMemory kUnknown{};
+  PixelMemory* const own = remembers_ ? &pixel_memory_plane(pixel.tile)[pixel.index] : nullptr;
   const auto seen = std::ranges::find_if(input.hits, &SurfaceHit::hit);
   const bool sees_catcher = seen != input.hits.end() && seen->is_catcher;
-  const VisibilityTable& memory = remembers_ ? table_of(pixel, sees_catcher) : kNothing;
+  const PixelVisibility memory(remembers_ ? table_of(pixel, sees_catcher) : kNothing,
+                               own != nullptr ? *own : kUnknown, tuning_.own_prior_rays);
   const kernels::CandidateCounts counts =
       counts_for_noise(tuning_, input.sites, num_candidates_, lobe_fraction_,
-                       light_variance(own != nullptr ? *own : PixelNoise{}));
+                       light_variance(own != nullptr ? *own : kUnknown));
   const kernels::CandidateSource candidates = candidate_source(input, counts);
   const float total = kernels::choose_pool_rays(tuning_, candidates,
                                                 Rng(input.key, PassId::choose).uniforms(0, 0)[0],
@@ -98,7 +100,8 @@ void PoolSampler::learn(const FoundRays& found, const PixelState& pixel) {
   if (!remembers_) return;
   const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
   const bool sees_catcher = pixel.tile.latest_source(pixel.index) == PixelSource::catcher;
-  remember_rays(memory_plane(pixel.tile, sees_catcher)[block], found.tag, found.is_free);
+  remember_rays(found.tag, found.is_free, block_memory_plane(pixel.tile, sees_catcher)[block],
+                pixel_memory_plane(pixel.tile)[pixel.index]);
 }
 
 }  // namespace baton

@@ -47,7 +47,7 @@ HWY_INLINE void LookUpShares(const ChosenCandidates& chosen, const DistinctPicks
     StoreRays(w, color, hn::Div(times, hn::Set(d, num_rays)), c.site, j, out);
   }
   out.count = picks.count;
-  std::fill_n(out.bin.from(0), picks.count, std::uint8_t{0});
+  std::fill_n(out.tag.from(0), picks.count, std::uint16_t{0});
 
   // Scale them to what all candidates reflect, channel by channel.
   const auto scale = [&](VF all, VF chosen_ones, PixelRays::Column<float>& column) HWY_ATTR {
