@@ -11,6 +11,7 @@
 #include "common/base/file_stamp.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/image/as_shown.h"
 #include "common/image/exr_image.h"
 #include "common/image/radiance.h"
 
@@ -87,11 +88,7 @@ Result<RgbImage> rgb_from_radiance(const std::filesystem::path& path) {
 }
 
 std::uint8_t channel_to_srgb8(float linear) {
-  if (!(linear > 0)) return 0;
-  const float clamped = std::min(linear, 1.0f);
-  const float encoded =
-      clamped <= 0.0031308f ? 12.92f * clamped : 1.055f * std::pow(clamped, 1.0f / 2.4f) - 0.055f;
-  return static_cast<std::uint8_t>(encoded * 255.0f + 0.5f);
+  return static_cast<std::uint8_t>(encode_srgb(linear) * 255.0f + 0.5f);
 }
 
 }  // namespace

@@ -112,6 +112,7 @@ Reference make_reference(MeasuredFrame a, MeasuredFrame b) {
   const std::vector<float> flip =
       flip_difference(reference.displayed, tone_map(a.image, reference.exposure));
   for (const std::size_t i : reference.lit_pixels) reference.flip += flip[i] / count;
+  reference.shown = ReferenceAsShown(a.image, b.image, a.coverage);
   reference.half = {std::move(a), std::move(b)};
   return reference;
 }

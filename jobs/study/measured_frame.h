@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/image/image_io.h"
+#include "jobs/study/as_shown.h"
 
 namespace baton {
 
@@ -37,6 +38,7 @@ struct Reference {
   /// Exposure of all images that are compared with it.
   float exposure = 1;
   RgbImage displayed;  ///< tone-mapped mean
+  ReferenceAsShown shown;
 
   /// Pixels with a surface, as indices.
   std::vector<std::size_t> lit_pixels;

@@ -66,6 +66,7 @@ FrameMeasures measure_frame(const MeasuredFrame& test, const Reference& referenc
 
   // The eye's.
   const RgbImage displayed = tone_map(test.image, reference.exposure);
+  m.shown = reference.shown.error_of(test.image);
   m.flip = mean_over(flip_difference(reference.displayed, displayed), reference.lit_pixels);
 
   // The sampler's own numbers.

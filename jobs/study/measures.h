@@ -21,6 +21,7 @@ struct FrameMeasures {
   double flip = 0;
   /// 99.9th percentile of |I - R|, the mean over R, G, B of a pixel.
   double percentile_99_9 = 0;
+  ErrorAsShown shown{};
   /// Mean of I - R, signed; noise of the rendering included.
   double bias = 0;
   double lns_mean = 0;  ///< mean Lns over mean Lns of the reference

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kFewSeeds = 20;
 /// Charts of a scene that are shown, over all frames and frame by frame; the others are folded.
-constexpr std::size_t kShownOverview = 3, kShownCourses = 2;
+constexpr std::size_t kShownOverview = 4, kShownCourses = 2;
 
 constexpr const char* kStyle = R"(
 body{font:14px/1.45 Helvetica,Arial,sans-serif;margin:2em auto;max-width:1320px;color:#222}
@@ -61,23 +61,30 @@ std::string summary_table(const Study& study, std::size_t scene,
                           const std::vector<CellSummary>& rows) {
   std::string html =
       "<table><tr><th>method</th><th>budget</th><th>CPU &micro;s/px</th><th>rays/px</th>"
-      "<th>light ms/frame</th><th>RMSE</th><th>relMSE</th><th>FLIP</th><th>99.9 %</th>"
+      "<th>light ms/frame</th><th>RMSE</th><th>as shown</th><th>darkest quarter</th><th>worst "
+      "block</th><th>black</th>"
+      "<th>relMSE</th><th>FLIP</th><th>99.9 %</th>"
       "<th>bias</th><th>flicker</th><th>lag</th><th>state B/px</th><th>efficiency / mis</th>"
-      "<th>efficiency / bidirectional</th></tr>\n";
+      "<th>efficiency / bidirectional</th><th>as shown / mis</th><th>as shown / "
+      "bidirectional</th></tr>\n";
   for (const CellSummary& row : rows) {
     const StudyCell& cell = study.cells[row.cell];
     if (cell.scene != scene) continue;
     fmt::format_to(std::back_inserter(html),
-                   "<tr><td>{}</td><td>{}</td><td>{:.3g}</td><td>{:.3g}</td><td>{:.3g}</td>{}{}{}"
+                   "<tr><td>{}</td><td>{}</td><td>{:.3g}</td><td>{:.3g}</td><td>{:.3g}</"
+                   "td>{}{}<td>{:.3g}</td><td>{:.3g}</td><td>{:.2g} %</td>{}{}"
                    "<td>{:.3g}</td><td{}>{:.2g} [{:.2g}, {:.2g}]</td>{}<td>{}</td><td>{:.3g}</td>",
                    escaped(study.methods[cell.method]), escaped(cell.budget), row.cost.cpu_us,
                    row.cost.rays, row.cost.light_ms, interval_cell(row.rmse),
-                   interval_cell(row.rel_mse), interval_cell(row.flip), row.percentile_99_9,
-                   row.biased ? " class=\"bad\"" : "", row.bias.value, row.bias.low, row.bias.high,
-                   interval_cell(row.flicker),
+                   interval_cell(row.shown), row.shown_darkest, row.shown_worst_block,
+                   100 * row.black, interval_cell(row.rel_mse), interval_cell(row.flip),
+                   row.percentile_99_9, row.biased ? " class=\"bad\"" : "", row.bias.value,
+                   row.bias.low, row.bias.high, interval_cell(row.flicker),
                    std::isnan(row.lag) ? "" : fmt::format("{}", row.lag), row.cost.state_bytes);
-    html += row.resolved ? ratio_cell(row.against_mis) + ratio_cell(row.against_bidirectional)
-                         : "<td class=\"weak\" colspan=\"2\">below the reference's own error</td>";
+    html += row.resolved ? ratio_cell(row.against_mis) + ratio_cell(row.against_bidirectional) +
+                               ratio_cell(row.shown_against_mis) +
+                               ratio_cell(row.shown_against_bidirectional)
+                         : "<td class=\"weak\" colspan=\"4\">below the reference's own error</td>";
     html += "</tr>\n";
   }
   return html + "</table>\n";

@@ -37,6 +37,11 @@ void visit_frame(Frame& m, F visit) {
   visit("relMse", m.rel_mse);
   visit("flip", m.flip);
   visit("percentile999", m.percentile_99_9);
+  visit("shownMse", m.shown.mse);
+  visit("shownDarkestMse", m.shown.darkest_mse);
+  visit("shownWorstBlockMse", m.shown.worst_block_mse);
+  visit("shownPercentile999", m.shown.percentile_99_9);
+  visit("black", m.shown.black);
   visit("bias", m.bias);
   visit("lnsMean", m.lns_mean);
   visit("lnsMedian", m.lns_median);

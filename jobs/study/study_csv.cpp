@@ -34,15 +34,19 @@ void for_each_run(const Study& study, const StudyResults& results, F line) {
 
 std::string measurements_csv(const Study& study, const StudyResults& results) {
   std::string csv =
-      "scene,method,budget,seed,frame,mse,relMse,flip,percentile99.9,bias,lnsMean,lnsMedian,ess,"
+      "scene,method,budget,seed,frame,mse,relMse,flip,percentile99.9,shownMse,shownDarkestMse,"
+      "shownWorstBlockMse,shownPercentile99.9,black,bias,lnsMean,lnsMedian,ess,"
       "acceptance,flicker,raysPerPixel,evaluationsPerPixel,resampledShare,restartedShare\n";
   for_each_run(study, results, [&](const std::string& labels, const RunRecord& run) {
     const RunCounts& s = run.counts;
     const std::uint64_t lit = s.lit_pixels();
     for (const FrameMeasures& m : run.frames) {
-      fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-                     labels, m.frame, number(m.mse), number(m.rel_mse), number(m.flip),
-                     number(m.percentile_99_9), number(m.bias), number(m.lns_mean),
+      fmt::format_to(std::back_inserter(csv),
+                     "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", labels,
+                     m.frame, number(m.mse), number(m.rel_mse), number(m.flip),
+                     number(m.percentile_99_9), number(m.shown.mse), number(m.shown.darkest_mse),
+                     number(m.shown.worst_block_mse), number(m.shown.percentile_99_9),
+                     number(m.shown.black), number(m.bias), number(m.lns_mean),
                      number(m.lns_median), number(m.ess), number(m.acceptance), number(m.flicker),
                      number(per(s.rays_shadow, lit)), number(per(s.target_evaluations, lit)),
                      number(per(s.pixels_resampled, lit)), number(per(s.pixels_restarted, lit)));
@@ -87,22 +91,27 @@ std::string efficiency_csv(const Study& study, const std::vector<CellSummary>& r
   std::string csv =
       "scene,method,budget,cpuMicrosecondsPerPixel,raysPerPixel,evaluationsPerPixel,"
       "lightMillisecondsPerFrame,stateBytesPerPixel,rmse,rmseLow,rmseHigh,relMse,relMseLow,"
-      "relMseHigh,flip,flipLow,flipHigh,percentile99.9,bias,biasLow,biasHigh,flicker,lag,resolved,"
+      "relMseHigh,shown,shownLow,shownHigh,shownDarkest,shownWorstBlock,shownPercentile99.9,black,"
+      "flip,flipLow,flipHigh,percentile99.9,bias,biasLow,biasHigh,flicker,lag,resolved,"
       "efficiencyOverMis,overMisLow,overMisHigh,efficiencyOverBidirectional,overBidirectionalLow,"
-      "overBidirectionalHigh\n";
+      "overBidirectionalHigh,shownEfficiencyOverMis,shownOverMisLow,shownOverMisHigh,"
+      "shownEfficiencyOverBidirectional,shownOverBidirectionalLow,shownOverBidirectionalHigh\n";
   const auto interval = [](const Interval& i) {
     return fmt::format("{},{},{}", number(i.value), number(i.low), number(i.high));
   };
   for (const CellSummary& row : rows) {
     const StudyCell& cell = study.cells[row.cell];
-    fmt::format_to(
-        std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-        study.scenes[cell.scene].name, study.methods[cell.method], cell.budget,
-        number(row.cost.cpu_us), number(row.cost.rays), number(row.cost.evaluations),
-        number(row.cost.light_ms), number(row.cost.state_bytes), interval(row.rmse),
-        interval(row.rel_mse), interval(row.flip), number(row.percentile_99_9), interval(row.bias),
-        number(row.flicker.value), number(row.lag), row.resolved ? 1 : 0, interval(row.against_mis),
-        interval(row.against_bidirectional));
+    fmt::format_to(std::back_inserter(csv),
+                   "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                   study.scenes[cell.scene].name, study.methods[cell.method], cell.budget,
+                   number(row.cost.cpu_us), number(row.cost.rays), number(row.cost.evaluations),
+                   number(row.cost.light_ms), number(row.cost.state_bytes), interval(row.rmse),
+                   interval(row.rel_mse), interval(row.shown), number(row.shown_darkest),
+                   number(row.shown_worst_block), number(row.shown_percentile), number(row.black),
+                   interval(row.flip), number(row.percentile_99_9), interval(row.bias),
+                   number(row.flicker.value), number(row.lag), row.resolved ? 1 : 0,
+                   interval(row.against_mis), interval(row.against_bidirectional),
+                   interval(row.shown_against_mis), interval(row.shown_against_bidirectional));
   }
   return csv;
 }

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numeric>
 
+#include "common/base/check.h"
+
 namespace baton {
 namespace {
 
@@ -18,14 +20,20 @@ constexpr double kOvercome = 1.5;
 /// What there is of an error in frames and in references.
 struct ErrorRow {
   const char* name;
-  double FrameMeasures::*measured;
-  double Reference::*own;
+  bool is_squared;  ///< its root is told
+  double (*measured)(const FrameMeasures&);
+  double (*own)(const Reference&);
 };
 const ErrorRow& row_of(ErrorKindOfImage kind) {
-  static constexpr std::array<ErrorRow, 3> kRows{
-      {{"RMSE", &FrameMeasures::mse, &Reference::mse},
-       {"relMSE", &FrameMeasures::rel_mse, &Reference::rel_mse},
-       {"FLIP", &FrameMeasures::flip, &Reference::flip}}};
+  using F = FrameMeasures;
+  using R = Reference;
+  static constexpr std::array<ErrorRow, 4> kRows{
+      {{"RMSE", true, [](const F& m) { return m.mse; }, [](const R& r) { return r.mse; }},
+       {"RMSE as shown", true, [](const F& m) { return m.shown.mse; },
+        [](const R& r) { return r.shown.own_mse(); }},
+       {"relMSE", false, [](const F& m) { return m.rel_mse; },
+        [](const R& r) { return r.rel_mse; }},
+       {"FLIP", false, [](const F& m) { return m.flip; }, [](const R& r) { return r.flip; }}}};
   return kRows.at(static_cast<std::size_t>(kind));
 }
 
@@ -47,12 +55,14 @@ std::vector<double> per_run(const std::vector<RunRecord>& runs, FrameChoice fram
   return values;
 }
 
-std::vector<double> squared_errors(const std::vector<RunRecord>& runs) {
-  return per_run(runs, {}, [](const FrameMeasures& m) { return m.mse; });
+std::vector<double> squared_errors(const std::vector<RunRecord>& runs, ErrorKindOfImage kind) {
+  BATON_CHECK(row_of(kind).is_squared);
+  return per_run(runs, {}, row_of(kind).measured);
 }
 
+double safe_root(double squared) { return std::sqrt(std::max(squared, 0.0)); }
+
 Interval root(Interval squared) {
-  const auto safe_root = [](double x) { return std::sqrt(std::max(x, 0.0)); };
   return {safe_root(squared.low), safe_root(squared.value), safe_root(squared.high)};
 }
 
@@ -85,10 +95,17 @@ CellSummary summarize_cell(const Study& study, const StudyResults& results, std:
   row.cell = cell;
   row.cost = cell_cost(runs);
   row.rmse = cell_error(runs, ErrorKindOfImage::rmse, {});
+  row.shown = cell_error(runs, ErrorKindOfImage::shown, {});
   row.rel_mse = cell_error(runs, ErrorKindOfImage::rel_mse, {});
   row.flip = cell_error(runs, ErrorKindOfImage::flip, {});
   const auto tails = per_run(runs, {}, [](const FrameMeasures& m) { return m.percentile_99_9; });
   row.percentile_99_9 = mean_interval(tails).value;
+  const auto mean = [&](auto measure) { return mean_interval(per_run(runs, {}, measure)).value; };
+  using M = FrameMeasures;
+  row.shown_darkest = safe_root(mean([](const M& m) { return m.shown.darkest_mse; }));
+  row.shown_worst_block = safe_root(mean([](const M& m) { return m.shown.worst_block_mse; }));
+  row.shown_percentile = mean([](const M& m) { return m.shown.percentile_99_9; });
+  row.black = mean([](const M& m) { return m.shown.black; });
   const auto flicker = per_run(runs, {}, [](const FrameMeasures& m) { return m.flicker; });
   row.flicker = flicker.empty() ? Interval{kNone, kNone, kNone} : mean_interval(flicker);
   row.lag = lag_after_cut(study.scene_of(cell), runs);
@@ -101,12 +118,14 @@ CellSummary summarize_cell(const Study& study, const StudyResults& results, std:
   row.bias.high = row.bias.value + std::hypot(row.bias.high - row.bias.value, extra);
   row.biased = row.bias.low > 0 || row.bias.high < 0;
 
-  const auto against = [&](Method method) {
+  const auto against = [&](Method method, ErrorKindOfImage kind) {
     const auto base = baseline(study, results, cell, method);
-    return base ? efficiency_ratio(results, *base, cell) : Interval{kNone, kNone, kNone};
+    return base ? efficiency_ratio(results, *base, cell, kind) : Interval{kNone, kNone, kNone};
   };
-  row.against_mis = against(Method::mis);
-  row.against_bidirectional = against(Method::bidirectional);
+  row.against_mis = against(Method::mis, ErrorKindOfImage::rmse);
+  row.against_bidirectional = against(Method::bidirectional, ErrorKindOfImage::rmse);
+  row.shown_against_mis = against(Method::mis, ErrorKindOfImage::shown);
+  row.shown_against_bidirectional = against(Method::bidirectional, ErrorKindOfImage::shown);
   return row;
 }
 
@@ -134,10 +153,8 @@ CellCost cell_cost(const std::vector<RunRecord>& runs) {
 }
 
 Interval cell_error(const std::vector<RunRecord>& runs, ErrorKindOfImage kind, FrameChoice frame) {
-  const auto values =
-      per_run(runs, frame, [kind](const FrameMeasures& m) { return m.*row_of(kind).measured; });
-  const Interval mean = mean_interval(values);
-  return kind == ErrorKindOfImage::rmse ? root(mean) : mean;
+  const Interval mean = mean_interval(per_run(runs, frame, row_of(kind).measured));
+  return row_of(kind).is_squared ? root(mean) : mean;
 }
 
 double reference_error(const std::vector<Reference>& references, ErrorKindOfImage kind,
@@ -145,18 +162,19 @@ double reference_error(const std::vector<Reference>& references, ErrorKindOfImag
   double sum = 0, count = 0;
   for (std::size_t f = 0; f < references.size(); ++f) {
     if (frame && *frame != f) continue;
-    sum += references[f].*row_of(kind).own;
+    sum += row_of(kind).own(references[f]);
     count += 1;
   }
   const double mean = count > 0 ? sum / count : 0;
-  return kind == ErrorKindOfImage::rmse ? std::sqrt(mean) : mean;
+  return row_of(kind).is_squared ? std::sqrt(mean) : mean;
 }
 
-Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::size_t cell) {
+Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::size_t cell,
+                          ErrorKindOfImage kind) {
   const double time = cell_cost(results.runs[cell]).cpu_us;
   const double factor = time > 0 ? cell_cost(results.runs[base]).cpu_us / time : kNone;
-  const Interval ratio =
-      ratio_interval(squared_errors(results.runs[base]), squared_errors(results.runs[cell]));
+  const Interval ratio = ratio_interval(squared_errors(results.runs[base], kind),
+                                        squared_errors(results.runs[cell], kind));
   return {ratio.low * factor, ratio.value * factor, ratio.high * factor};
 }
 

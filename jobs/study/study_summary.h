@@ -10,9 +10,10 @@
 namespace baton {
 
 /// How errors are measured in charts.
-enum class ErrorKindOfImage : std::uint8_t { rmse, rel_mse, flip };
-inline constexpr ErrorKindOfImage kImageErrors[] = {
-    ErrorKindOfImage::rmse, ErrorKindOfImage::rel_mse, ErrorKindOfImage::flip};
+enum class ErrorKindOfImage : std::uint8_t { rmse, shown, rel_mse, flip };
+inline constexpr ErrorKindOfImage kImageErrors[] = {ErrorKindOfImage::rmse, ErrorKindOfImage::shown,
+                                                    ErrorKindOfImage::rel_mse,
+                                                    ErrorKindOfImage::flip};
 const char* name_of(ErrorKindOfImage kind);
 
 /// What a rendering of a cell costs: middle of its renderings, per pixel with a surface and frame.
@@ -39,8 +40,9 @@ double reference_error(const std::vector<Reference>& references, ErrorKindOfImag
                        FrameChoice frame);
 
 /// MSE x time of cell `base` over that of `cell`, over all frames: how much more efficient `cell`
-/// is. NaN when it took no time.
-Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::size_t cell);
+/// is, by a squared error: in linear radiance or as shown. NaN when it took no time.
+Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::size_t cell,
+                          ErrorKindOfImage kind = ErrorKindOfImage::rmse);
 
 /// Positions of the points that no other one beats in both: not slower and smaller. Equal points
 /// count once. costs, errors: of one length.
@@ -54,8 +56,11 @@ double lag_after_cut(const StudyScene& scene, const std::vector<RunRecord>& runs
 struct CellSummary {
   std::size_t cell = 0;
   CellCost cost;
-  Interval rmse, rel_mse, flip, bias;
+  Interval rmse, shown, rel_mse, flip, bias;
   double percentile_99_9 = 0;
+  /// As shown: RMSE of the darkest quarter and of the worst square, 99.9th percentile, share of
+  /// black specks; means over frames and renderings.
+  double shown_darkest = 0, shown_worst_block = 0, shown_percentile = 0, black = 0;
   /// Over renderings; NaN when no two measured frames follow each other.
   Interval flicker;
   double lag = 0;  ///< lag_after_cut; NaN without a cut
@@ -66,6 +71,8 @@ struct CellSummary {
   /// MSE x time of the baseline over MSE x time of this cell: > 1 is better. The baseline has the
   /// budget of the same name, or is the best of its method. NaN without the method in the study.
   Interval against_mis, against_bidirectional;
+  /// The same by the error as shown.
+  Interval shown_against_mis, shown_against_bidirectional;
 };
 std::vector<CellSummary> summarize_study(const Study& study, const StudyResults& results);
 

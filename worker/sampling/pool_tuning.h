@@ -15,7 +15,7 @@ struct PoolTuning {
   /// Rays that the guess of coarser bins counts as, in what a bin expects (VisibilityTable).
   float prior_rays = 6;
   /// Rays that what its block expects counts as, beside a pixel's own (PixelVisibility).
-  float own_prior_rays = 24;
+  float own_prior_rays = 32;
 
   /// Least factor on a candidate's weight where V^ is the control variate: candidates whose
   /// visibility has no variance still get some rays.

@@ -274,10 +274,10 @@ Timeline Case::timeline(const Effort& effort) const {
 }
 
 std::vector<Law> usual_laws() {
-  return {{Measure::unlawful, 0, 0},       {Measure::negative, 1e-4, 1e-2},
-          {Measure::bias, 0.01, 0.05},     {Measure::lns_bias, 0.01, 0.05},
-          {Measure::lns_median, 0.1, 0.3}, {Measure::noise, 2, 5},
-          {Measure::lost, 0.01, 0.1}};
+  return {
+      {Measure::unlawful, 0, 0},       {Measure::negative, 1e-4, 1e-2}, {Measure::bias, 0.01, 0.05},
+      {Measure::lns_bias, 0.01, 0.05}, {Measure::lns_median, 0.1, 0.3}, {Measure::noise, 2, 5},
+      {Measure::noise_shown, 2, 5},    {Measure::black, 1e-3, 1e-2},    {Measure::lost, 0.01, 0.1}};
 }
 
 std::vector<Case> all_cases() {

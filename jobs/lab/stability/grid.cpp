@@ -23,6 +23,8 @@ constexpr std::pair<const char*, double Numbers::*> kColumns[] = {
     {"lns_mean_interval", &Numbers::lns_mean_interval},
     {"lns_median", &Numbers::lns_median},
     {"noise", &Numbers::noise},
+    {"noise_shown", &Numbers::noise_shown},
+    {"black", &Numbers::black},
     {"noise_after", &Numbers::noise_after},
     {"p999", &Numbers::tail},
     {"lost", &Numbers::lost},

@@ -34,6 +34,10 @@ double value_of(Measure measure, const Numbers& n, const Numbers& fresh) {
       return n.lns_median > 0 ? std::max(n.lns_median, 1 / n.lns_median) - 1 : 1e9;
     case Measure::noise:
       return quotient(n.noise, fresh.noise);
+    case Measure::noise_shown:
+      return quotient(n.noise_shown, fresh.noise_shown);
+    case Measure::black:
+      return n.black - fresh.black;
     case Measure::noise_after:
       return quotient(n.noise_after, fresh.noise_after);
     case Measure::lost:
@@ -59,6 +63,10 @@ std::string words_of(Measure measure, const Numbers& n, const Numbers& fresh) {
       return fmt::format("median Lns^/Lns {:.2f}", n.lns_median);
     case Measure::noise:
       return fmt::format("noise x{:.1f}", value);
+    case Measure::noise_shown:
+      return fmt::format("noise as shown x{:.1f}", value);
+    case Measure::black:
+      return fmt::format("{:.1g} % of pixels black", 100 * n.black);
     case Measure::noise_after:
       return fmt::format("noise x{:.1f} after the jump", value);
     case Measure::lost:

@@ -17,6 +17,10 @@ struct Numbers {
   /// late: median Lns^/Lns over pixels, frames and renderings.
   double lns_median = 1;
   double noise = 0;  ///< late: RMSE of a pixel / mean radiance
+  /// late: RMSE of a pixel of the picture as shown (common/image/as_shown.h), at the exposure of
+  /// the exact answer of each frame.
+  double noise_shown = 0;
+  double black = 0;  ///< late: share of values that are 0 where the exact answer is not
   /// Noise in the two frames from the light's jump on.
   double noise_after = 0;
   /// late: 99.9th percentile of a pixel's error / mean radiance.
@@ -42,7 +46,10 @@ enum class Measure : std::uint8_t {
   lns_median,  ///< max(m, 1/m) - 1 of lns_median
   /// Noise over that of fresh samples (`bidirectional`, same N and M).
   noise,
+  noise_shown,  ///< as `noise`, as shown
   noise_after,  ///< as `noise`, right after the jump
+  /// Beyond that of fresh samples.
+  black,
   lost,
   /// Growth over that of fresh samples, for which only the light has changed.
   growth,

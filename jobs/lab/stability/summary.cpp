@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/image/as_shown.h"
+
 namespace baton::stability {
 namespace {
 
@@ -41,6 +43,8 @@ struct FrameErrors {
   std::vector<double> error;         ///< (I - R) / mean R, pixels and renderings
   std::vector<double> ratio_of_run;  ///< (renderings) mean
   std::vector<double> error_of_run;  ///< (renderings) mean
+  double shown_square = 0;           ///< mean squared error as shown
+  double black = 0;                  ///< share of values that are 0 and should not be
   double mean_square() const {
     double sum = 0;
     for (const double e : error) sum += e * e;
@@ -55,11 +59,20 @@ FrameErrors errors_of(const FrameTruth& truth, const std::vector<std::vector<flo
   const double mean_radiance = mean_of(truth.radiance);
   out.lit = mean_lns > 0 && mean_radiance > 0;
   if (!out.lit) return out;
+  const std::vector<float> exact(truth.radiance.begin(), truth.radiance.end());
+  const double exposure = exposure_as_shown(exact);
+  const auto shown = [exposure](double value) {
+    return double{encode_srgb(static_cast<float>(exposure * value))};
+  };
+  const auto share = 1 / static_cast<double>(radiance.size() * exact.size());
   for (std::size_t r = 0; r < radiance.size(); ++r) {
     std::vector<double> ratio;
     std::vector<double> error;
     for (std::size_t p = 0; p < truth.lns.size(); ++p) {
       error.push_back((radiance[r][p] - truth.radiance[p]) / mean_radiance);
+      const double off = shown(radiance[r][p]) - shown(truth.radiance[p]);
+      out.shown_square += share * off * off;
+      if (truth.radiance[p] > 0 && !(radiance[r][p] > 0)) out.black += share;
       if (truth.lns[p] > kLitShare * mean_lns) ratio.push_back(lns[r][p] / truth.lns[p]);
     }
     out.ratio_of_run.push_back(mean_of(ratio));
@@ -108,11 +121,13 @@ void summarise_late(const std::vector<FrameErrors>& late, Numbers& n) {
   std::vector<double> error;
   std::vector<double> ratio_of_run;
   std::vector<double> error_of_run;
-  double squares = 0;
+  double squares = 0, shown_squares = 0;
   for (const FrameErrors& e : late) {
     ratio.insert(ratio.end(), e.ratio.begin(), e.ratio.end());
     for (const double v : e.error) error.push_back(std::fabs(v));
     squares += e.mean_square() / static_cast<double>(late.size());
+    shown_squares += e.shown_square / static_cast<double>(late.size());
+    n.black += e.black / static_cast<double>(late.size());
     ratio_of_run.resize(e.ratio_of_run.size());
     error_of_run.resize(e.error_of_run.size());
     for (std::size_t r = 0; r < ratio_of_run.size(); ++r) {
@@ -125,6 +140,7 @@ void summarise_late(const std::vector<FrameErrors>& late, Numbers& n) {
   n.lns_mean = mean_of(ratio_of_run);
   n.lns_mean_interval = interval(ratio_of_run);
   n.noise = std::sqrt(squares);
+  n.noise_shown = std::sqrt(shown_squares);
   n.growth = ratio_error(ratio);
   n.lost = ratio.empty() ? 0.0
                          : static_cast<double>(std::count_if(

@@ -109,6 +109,76 @@ TEST(Measures, FlickerOfIndependentAndOfFrozenErrors) {
   EXPECT_TRUE(std::isnan(measure_flicker(flat(0.5f), reference, flat(0.5f), reference)));
 }
 
+// A grey of .18 is shown as .4 at the exposure that makes the mean .4; the curve of sRGB does the
+// rest by hand.
+TEST(AsShown, ErrorsAreThoseOfThePictureAtItsExposure) {
+  const FrameMeasures same = measure_frame(flat(0.18f), make_reference(flat(0.18f), flat(0.18f)));
+  EXPECT_EQ(same.shown.mse, 0);
+  EXPECT_EQ(same.shown.black, 0);
+
+  const Reference reference = make_reference(flat(0.18f), flat(0.18f));
+  const FrameMeasures twice = measure_frame(flat(0.36f), reference);
+  const double linear = std::pow((0.4 + 0.055) / 1.055, 2.4);
+  const double error = 1.055 * std::pow(2 * linear, 1 / 2.4) - 0.055 - 0.4;
+  EXPECT_NEAR(std::sqrt(twice.shown.mse), error, 1e-4);
+  EXPECT_NEAR(std::sqrt(twice.shown.darkest_mse), error, 1e-4);
+  EXPECT_NEAR(std::sqrt(twice.shown.worst_block_mse), error, 1e-4);
+  EXPECT_NEAR(twice.shown.percentile_99_9, error, 1e-4);
+}
+
+TEST(AsShown, AHighlightCountsNoMoreThanWhite) {
+  MeasuredFrame bright = flat(0.18f);
+  for (std::size_t i = 0; i < kPixels / 2; ++i)
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) bright.image.rgb[k] = 1e6f;
+  const Reference reference = make_reference(flat(0.18f), flat(0.18f));
+  EXPECT_NEAR(measure_frame(bright, reference).shown.mse, 0.5 * 0.6 * 0.6, 1e-4);
+}
+
+TEST(AsShown, DarkPlacesBlocksAndSpecksAreToldApart) {
+  // The left half is dark; one pixel in it is lost, and one that is black in the reference.
+  MeasuredFrame half = flat(1);
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)
+      half.image.rgb[k] = i == 2 ? 0.0f : i % kWidth < kWidth / 2 ? 0.01f : 1.0f;
+  }
+  MeasuredFrame test = half;
+  for (std::size_t k = 3; k < 6; ++k) test.image.rgb[k] = 0;
+  const ErrorAsShown error = measure_frame(test, make_reference(half, half)).shown;
+  EXPECT_NEAR(error.black, 1.0 / kPixels, 1e-12) << "of two black ones the reference has one";
+  EXPECT_NEAR(error.darkest_mse, 2 * error.mse, 1e-9) << "equal values are a half of the picture";
+  EXPECT_NEAR(error.worst_block_mse, error.mse, 1e-12) << "128 pixels are one square";
+}
+
+TEST(AsShown, PixelsThatASurfaceCoversInPartDoNotCount) {
+  MeasuredFrame half = flat(0.5f), test = flat(0.5f);
+  half.coverage[3] = 0.99f;
+  for (std::size_t k = 9; k < 12; ++k) test.image.rgb[k] = 0;
+  const ErrorAsShown error = measure_frame(test, make_reference(half, half)).shown;
+  EXPECT_EQ(error.mse, 0);
+  EXPECT_EQ(error.black, 0);
+}
+
+// H0: the error against halves of noise .02 is that against the truth; 200 seeds, 1 % of one
+// deviation of the mean is .2 % of it. Counting the reference's own noise would add 50 %.
+TEST(AsShown, TheNoiseOfTheReferenceDropsOut) {
+  double against_halves = 0, against_truth = 0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    const MeasuredFrame test = noisy(0.5f, 0.02f, 3 * seed + 2);
+    against_halves += measure_frame(test, make_reference(noisy(0.5f, 0.02f, 3 * seed),
+                                                         noisy(0.5f, 0.02f, 3 * seed + 1)))
+                          .shown.mse;
+    against_truth += measure_frame(test, make_reference(flat(0.5f), flat(0.5f))).shown.mse;
+  }
+  EXPECT_NEAR(against_halves / against_truth, 1, 0.02);
+}
+
+TEST(AsShown, PicturesWithoutAnyPixelOrLightAreMeasured) {
+  MeasuredFrame nothing = flat(0);
+  EXPECT_EQ(measure_frame(nothing, make_reference(nothing, nothing)).shown.mse, 0);
+  nothing.coverage.assign(kPixels, 0);
+  EXPECT_EQ(measure_frame(nothing, make_reference(nothing, nothing)).shown.mse, 0);
+}
+
 TEST(Reference, OneWhoseHalvesDifferByMoreThanItSaysIsNotTrusted) {
   const auto reference = [](float told) {
     MeasuredFrame a = noisy(2, 0.3f, 5), b = noisy(2, 0.3f, 6);
