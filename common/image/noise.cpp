@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
+
+#include "common/image/as_shown.h"
 
 namespace baton {
 void FrameNoise::add_pixel(double grey) {
@@ -39,19 +42,67 @@ double cycles_noise_squared(double variance, double grey) {
 }
 
 float cycles_noise(const FilmTile& film) {
+  constexpr double kExceeded = 0.01;
   const FilmColors colors(film);
   const float* const error = film.find(kErrorChannel);
   if (!colors || error == nullptr) return 0;
+  struct Square {
+    double sum = 0;
+    std::size_t count = 0;
+    double mean() const { return sum / static_cast<double>(count); }
+  };
+  const auto along = [](std::int32_t size) { return (size + kNoiseBlockPx - 1) / kNoiseBlockPx; };
+  const std::int32_t columns = along(film.rect.width());
+  std::vector<Square> squares(static_cast<std::size_t>(columns) * along(film.rect.height()));
+  Square all;
+  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+    const double grey = colors.grey(i);
+    if (error[i] == kErrorUnknown) return 0;
+    if (!(error[i] >= 0) || !std::isfinite(error[i]) || !std::isfinite(grey)) continue;
+    const auto x = static_cast<std::int32_t>(i) % film.rect.width() / kNoiseBlockPx;
+    const auto y = static_cast<std::int32_t>(i) / film.rect.width() / kNoiseBlockPx;
+    for (Square* const square : {&all, &squares[static_cast<std::size_t>(y * columns + x)]}) {
+      square->sum += cycles_noise_squared(double{error[i]}, grey);
+      ++square->count;
+    }
+  }
+  if (all.count == 0) return 0;
+
+  // The square that at most 1 % exceed.
+  std::vector<double> means;
+  for (const Square& square : squares)
+    if (square.count >= kFewestInNoiseBlock) means.push_back(square.mean());
+  if (means.empty()) return static_cast<float>(std::sqrt(all.mean()));
+  const auto above = static_cast<std::size_t>(kExceeded * static_cast<double>(means.size()));
+  const auto at = means.begin() + static_cast<std::ptrdiff_t>(means.size() - 1 - above);
+  std::nth_element(means.begin(), at, means.end());
+  return static_cast<float>(std::sqrt(*at));
+}
+
+float noise_as_shown(const FilmTile& film) {
+  const FilmColors colors(film);
+  const float* const error = film.find(kErrorChannel);
+  if (!colors || error == nullptr) return 0;
+  std::vector<float> greys;
+  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+    const auto grey = static_cast<float>(colors.grey(i));
+    if (error[i] != kNoSurface && std::isfinite(grey)) greys.push_back(grey);
+  }
+  const double exposure = exposure_as_shown(greys);
   double sum = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < film.num_pixels(); ++i) {
     const double grey = colors.grey(i);
     if (!(error[i] >= 0) || !std::isfinite(error[i]) || !std::isfinite(grey)) continue;
-    sum += cycles_noise_squared(double{error[i]}, grey);
+    const double sigma = std::sqrt(double{error[i]});
+    const auto shown = [&](double value) {
+      return double{encode_srgb(static_cast<float>(exposure * value))};
+    };
+    const double half = (shown(grey + sigma) - shown(grey - sigma)) / 2;
+    sum += half * half;
     ++count;
   }
-  if (count == 0) return 0;
-  return static_cast<float>(std::sqrt(sum / static_cast<double>(count)));
+  return count == 0 ? 0 : static_cast<float>(std::sqrt(sum / static_cast<double>(count)));
 }
 
 FrameNoise noise_of_film(const FilmTile& film) {

@@ -23,8 +23,10 @@ struct FilmColors {
 ///
 ///   sqrt(mean over probes of sigma^2) / (mean over surfaces of grey)
 ///
-/// grey: mean of R, G and B of a pixel; sigma^2: an estimate without bias of its squared error at
-/// fixed sites; surfaces: all pixels that see one; probes: those of them whose error is known.
+/// grey: mean of R, G and B of a pixel; sigma^2: an estimate of its squared error; surfaces: all
+/// pixels that see one; probes: those of them whose error is known. Of frames of several rounds or
+/// sweeps that is all of them, by the scatter of these, sites included; of a single round one in
+/// 128, sampled twice at the same sites.
 /// Methods rank by it as by their RMSE, as all of them have the same mean.
 class FrameNoise {
  public:
@@ -60,15 +62,25 @@ inline constexpr float kNoSurface = -2, kErrorUnknown = -1;
 /// variance / grey. Dark pixels count as much as a grey of 1e-4.
 double cycles_noise_squared(double variance, double grey);
 
-/// Its rms over the probes. 0: a film without errors.
+/// What quality.noiseThreshold is held against: the rms of that measure over the pixels of each
+/// square of kNoiseBlockPx on the film's grid that has kFewestInNoiseBlock surfaces, and of these
+/// squares the one that at most 1 % exceed. Where no square has as many, all pixels are one. 0: not
+/// told, as of a film of a single round, whose probes are too few to say it of a corner.
 float cycles_noise(const FilmTile& film);
+inline constexpr int kNoiseBlockPx = 16;
+inline constexpr std::size_t kFewestInNoiseBlock = 64;
+
+/// The noise of a film as people see it: the rms over its probes of half the distance of
+/// grey + sigma and grey - sigma, both as shown (common/image/as_shown.h) at the exposure of the
+/// surfaces' grey. In [0, .5]; 0: not told.
+float noise_as_shown(const FilmTile& film);
 
 /// Noise of a film with an error plane and R, G, B; not told without them. Sums are taken in the
 /// order of the pixels.
 FrameNoise noise_of_film(const FilmTile& film);
 
-/// Noise of two frames with the channels R, G, B, A of one size, by two seeds that see the same
-/// sites; pixels that see a surface are those with alpha. Not told without the channels.
+/// Noise of two frames with the channels R, G, B, A of one size, by two seeds; pixels that see a
+/// surface are those with alpha. Not told without the channels.
 FrameNoise noise_of_seeds(const FilmTile& a, const FilmTile& b);
 
 }  // namespace baton

@@ -108,7 +108,8 @@ void SamplingStats::count_ess(float ess_ratio) {
 void SamplingStats::merge(const SamplingStats& b) { add(*this, b); }
 
 std::string_view noise_source_name(NoiseSource source) {
-  constexpr std::array<std::string_view, 4> kNames{"none", "halves", "neighbors", "probes"};
+  constexpr std::array<std::string_view, 5> kNames{"none", "halves", "neighbors", "probes",
+                                                   "scatter"};
   return kNames.at(static_cast<std::size_t>(source));
 }
 

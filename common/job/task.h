@@ -155,10 +155,17 @@ struct SamplingStats {
 };
 
 /// What the noise of a frame was told from. Stored and sent; values are for ever. probes: pixels
-/// that were sampled twice. halves, neighbors: other measures, of frames of earlier programs.
-enum class NoiseSource : std::uint8_t { none = 0, halves = 1, neighbors = 2, probes = 3 };
-constexpr NoiseSource last_of(NoiseSource) { return NoiseSource::probes; }
-/// "none", "halves", "neighbors", "probes".
+/// that were sampled twice, at the same sites. scatter: that of rounds or sweeps in all pixels,
+/// sites included. halves, neighbors: other measures, of frames of earlier programs.
+enum class NoiseSource : std::uint8_t {
+  none = 0,
+  halves = 1,
+  neighbors = 2,
+  probes = 3,
+  scatter = 4
+};
+constexpr NoiseSource last_of(NoiseSource) { return NoiseSource::scatter; }
+/// "none", "halves", "neighbors", "probes", "scatter".
 std::string_view noise_source_name(NoiseSource source);
 
 /// What was seen of a whole frame when it was written, of R, G and B, before anything was set to 0.
@@ -172,6 +179,7 @@ struct FrameQuality {
   /// FrameNoise::relative() (common/image/noise.h).
   float noise = 0;
   float noise_error = 0;  ///< standard error of `noise`, as a share
+  float noise_shown = 0;  ///< noise_as_shown() (common/image/noise.h), [0, .5]
   /// In the measure of quality.noiseThreshold (common/image/noise.h); 0: not told.
   float cycles_noise = 0;
   float mean = 0;    ///< radiance, over pixels and the three

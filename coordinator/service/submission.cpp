@@ -198,14 +198,17 @@ Result<bool> Submission::grow(const Digest& version) {
   for (const auto& [frame, stats] : job.tasks.frames()) {
     if (!locked.contains(frame)) noise = std::max(noise, stats.quality.cycles_noise);
   }
-  const bool is_blind = quality.noise_threshold && noise == 0;
+  const bool is_one_round = quality.rounds * quality.sweeps == 1;
+  const bool is_blind = quality.noise_threshold && noise == 0 && !is_one_round;
   const double seconds = static_cast<double>(now_ms() - growth.since_ms) / 1000;
   const int next = is_blind
                        ? quality.sweeps
                        : next_sweeps(quality, noise, seconds, quality.sweeps - growth.first_sweeps);
   std::string said = is_blind ? std::string("no frame tells its noise here: no more rounds")
-                              : fmt::format("{} rounds: noise {:.3g} as Cycles measures it",
-                                            std::int64_t{quality.rounds} * quality.sweeps, noise);
+                     : is_one_round
+                         ? std::string("1 round, which does not tell its noise")
+                         : fmt::format("{} rounds: noise {:.3g} as Cycles measures it",
+                                       std::int64_t{quality.rounds} * quality.sweeps, noise);
   bool grows = next > quality.sweeps;
   if (grows) {
     const std::string more =

@@ -43,6 +43,7 @@ void add_quality(const FrameQuality& q, ordered_json& row) {
   if (q.noise_source != NoiseSource::none) {
     row["noise"] = q.noise;
     row["noiseError"] = q.noise_error;
+    row["noiseShown"] = q.noise_shown;
     row["noiseFrom"] = noise_source_name(q.noise_source);
   }
   if (q.cycles_noise > 0) row["cyclesNoise"] = q.cycles_noise;
@@ -74,7 +75,10 @@ ordered_json judgement_json(std::span<const FrameReport> frames) {
                          {"pixelsBeyondHalf", j.pixels_beyond_half},
                          {"pixelsNotFinite", j.pixels_not_finite},
                          {"pixelsAfresh", j.carries ? j.pixels_afresh : 0}};
-  if (j.noise_source != NoiseSource::none) result["noise"] = j.noise;
+  if (j.noise_source != NoiseSource::none) {
+    result["noise"] = j.noise;
+    result["noiseShown"] = j.noise_shown;
+  }
   return result;
 }
 
@@ -167,7 +171,10 @@ std::string judgement_text(const JobDetail& detail) {
       text += fmt::format(", by frame {} to {} (frame {})", percent(j.noise_least),
                           percent(j.noise_most), j.noisiest);
     }
-    text += "; told from pixels that were sampled twice\n";
+    text += fmt::format("; as shown {}; told from {}\n", percent(j.noise_shown),
+                        j.noise_source == NoiseSource::scatter
+                            ? "the scatter of rounds"
+                            : "pixels that were sampled twice, without that of edges");
   }
   for (std::size_t i = 0; i < j.odd.size() && i < kMostOdd; ++i) {
     text +=

@@ -5,6 +5,8 @@
 // are 16 to 39 %, as few pixels make most of its noise: too much for a test.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "common/image/noise.h"
 #include "tests/support/small_scene.h"
 
@@ -46,7 +48,8 @@ class FrameOverSeeds {
     sum_.resize(grey.size());
     squares_.resize(grey.size());
     const auto alpha = test::channel(film, "A");
-    alpha_.assign(alpha.begin(), alpha.end());
+    alpha_.resize(grey.size());
+    for (std::size_t i = 0; i < grey.size(); ++i) alpha_[i] = std::max(alpha_[i], alpha[i]);
     for (std::size_t i = 0; i < grey.size(); ++i) {
       sum_[i] += grey[i] / kSeeds;
       squares_[i] += grey[i] * grey[i] / kSeeds;
@@ -79,19 +82,20 @@ std::vector<FrameOverSeeds> repeat(JobSpec job) {
   for (int seed = 1; seed <= kSeeds; ++seed) {
     job.seed = static_cast<std::uint64_t>(seed);
     const std::vector<FilmTile> films = test::render_tile(job).films;
-    for (std::size_t f = 0; f < frames.size(); ++f) frames[f].add(films.at(f));
+    const std::size_t first = films.size() - frames.size();  // of the last sweep
+    for (std::size_t f = 0; f < frames.size(); ++f) frames[f].add(films.at(first + f));
   }
   return frames;
 }
 
-void expect_truth(const JobSpec& job) {
+void expect_truth(const JobSpec& job, double limit = kLimit) {
   const std::vector<FrameOverSeeds> frames = repeat(job);
   for (const FrameOverSeeds* frame : {&frames.front(), &frames.back()}) {
     const double error = frame->error_share();
     std::printf("  %-13s %d sites, told %.4f, is %.4f: %.3f +- %.3f\n",
                 std::string(traits(job.sampling.method).name).c_str(), job.image.sites,
                 frame->told(), frame->truth(), frame->told() / frame->truth(), error);
-    EXPECT_NEAR(frame->told() / frame->truth(), 1, kLimit);
+    EXPECT_NEAR(frame->told() / frame->truth(), 1, limit);
   }
 }
 
@@ -117,13 +121,32 @@ TEST(ToldNoiseOf, RatioAndReferenceIsTrue) {
   expect_truth(job);
 }
 
-TEST(ToldNoiseOf, SeveralRoundsIsTrue) {
-  for (const Method method : {Method::pool, Method::bidirectional}) {
-    JobSpec job = noise_job(method, 1, Moves::light);
-    job.quality.rounds = 3;
-    expect_truth(job);
+/// Rounds and sweeps, whose scatter tells the noise of what is seen: over seeds that choose the
+/// sites, too. Standard errors are below 1 %, but sites that are stratified over rounds make the
+/// told noise of edges too large.
+struct Scatter {
+  Method method;
+  int sites, rounds, sweeps;
+  bool lens;
+};
+class ToldNoiseByScatter : public testing::TestWithParam<Scatter> {};
+TEST_P(ToldNoiseByScatter, IsTrue) {
+  const Scatter& of = GetParam();
+  for (const Moves moves : {Moves::light, Moves::camera}) {
+    JobSpec job = noise_job(of.method, of.sites, moves);
+    job.image.site_seed = 0;
+    job.quality.rounds = of.rounds;
+    job.quality.sweeps = of.sweeps;
+    if (of.lens) job.camera.aperture = 0.2f;
+    expect_truth(job, 0.15);
   }
 }
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, ToldNoiseByScatter,
+    testing::Values(Scatter{Method::pool, 1, 2, 1, false}, Scatter{Method::pool, 4, 3, 1, false},
+                    Scatter{Method::pool, 1, 4, 1, true}, Scatter{Method::pool, 4, 1, 3, false},
+                    Scatter{Method::pool, 1, 2, 2, false}, Scatter{Method::mis, 4, 2, 1, false},
+                    Scatter{Method::bidirectional, 1, 4, 1, false}));
 
 // Another draw from the samples that are carried would be as wrong as they are.
 TEST(ToldNoiseOf, CarriedSamplesIsNotTold) {

@@ -33,7 +33,7 @@ void RoundMean::add(std::size_t index, const PixelResult& pixel, double weight) 
   if (sums_.empty()) return film_.write(index, pixel);
   PixelSum& sum = sums_[index];
   const double seen = double{baton::mean(pixel.radiance)} + double{baton::mean(pixel.shadow)};
-  const bool is_first = !some_judge_ || sum.num_rounds < limits::kJudgingRounds;
+  const bool is_first = sum.num_rounds < (some_judge_ ? limits::kJudgingRounds : num_rounds_ / 2);
   (is_first ? sum.scatter.first : sum.scatter.rest).add(pixel.radiance, weight);
   ++sum.num_rounds;
   sum.seen += seen;
@@ -44,8 +44,6 @@ void RoundMean::add(std::size_t index, const PixelResult& pixel, double weight) 
   add_to(sum.blocked, pixel.blocked, weight);
   sum.catcher += weight * double{pixel.catcher};
   if (!(pixel.coverage > 0)) return;
-  if (pixel.error >= 0)
-    sum.error = std::max(sum.error, 0.0) + weight * weight * double{pixel.error};
   if (sum.weight_seen == 0) sum.material = pixel.material;
   sum.weight_seen += weight;
   sum.coverage += weight * double{pixel.coverage};
@@ -78,9 +76,12 @@ PixelResult RoundMean::mean(const PixelSum& sum) const {
   pixel.shadow = scaled(sum.shadow, 1 / k);
   pixel.catcher = static_cast<float>(sum.catcher / k);
   pixel.rounds = static_cast<float>(sum.num_rounds);
-  if (rounds_are_uncorrelated_) pixel.variance = sum.scatter.variance_of_mean();
+  PixelVariance told{.grey = kErrorUnknown};
+  if (rounds_are_uncorrelated_)
+    told = some_judge_ ? sum.scatter.of_judged() : sum.scatter.of_halves();
+  pixel.variance = told.color;
   if (sum.weight_seen == 0) return pixel;
-  pixel.error = sum.error >= 0 ? static_cast<float>(sum.error / (k * k)) : kErrorUnknown;
+  pixel.error = told.grey;
   const double seen = 1.0 / sum.weight_seen;
   pixel.coverage = static_cast<float>(sum.coverage / k);
   pixel.depth = static_cast<float>(sum.depth / sum.coverage);

@@ -21,18 +21,16 @@ struct PixelSum {
   /// What is shown: grey radiance and shadow; and its squares.
   double seen = 0, seen_squares = 0;
   std::int32_t num_rounds = 0;
-  double error = kErrorUnknown;  ///< sum over the rounds where it is known
-  std::uint32_t material = 0;    ///< as in the first round that sees one
-  double weight_seen = 0;        ///< weight of rounds that see a surface
+  std::uint32_t material = 0;  ///< as in the first round that sees one
+  double weight_seen = 0;      ///< weight of rounds that see a surface
 };
 
 /// A frame of a tile as the mean of its rounds, each with its weight; those of a pixel add up to
 /// quality.rounds. Colours, alpha, Lns: over all rounds. Depth and
 /// normal: over the sites that see a surface; visibility: share of all rounds' light; what a method
-/// did: over the rounds that see a surface. variance: from the scatter of the rounds, which is
-/// unbiased where they are uncorrelated, as they are for all methods that carry no samples; with
-/// carried samples 0. error: the probes of all rounds are the same pixels; without bias, as each
-/// round is, given those before.
+/// did: over the rounds that see a surface. variance and error: from the scatter of the rounds,
+/// sites included, which is told where they are uncorrelated, as they are for all methods that
+/// carry no samples; with carried samples 0 and unknown.
 class RoundMean {
  public:
   RoundMean(const JobSpec& job, const PixelRect& rect);

@@ -17,23 +17,39 @@ namespace {
 float mean(float of_earlier, double count, float value) {
   return static_cast<float>((count * double{of_earlier} + double{value}) / (count + 1));
 }
-/// The variance of such a mean, from those of its parts.
-float variance_of_mean(float of_earlier, double count, float value) {
-  return static_cast<float>((count * count * double{of_earlier} + double{value}) /
-                            ((count + 1) * (count + 1)));
+/// The variance of such a mean by the scatter of its parts [Welford 1962]. of_earlier: that of the
+/// earlier mean, which of a single one is not known.
+float variance_of_mean(float of_earlier, float earlier, double count, float value) {
+  const double before = count > 1 ? double{of_earlier} * count * (count - 1) : 0.0;
+  const double step = double{value} - double{earlier};
+  const double squares = before + step * step * count / (count + 1);
+  return static_cast<float>(squares / (count * (count + 1)));
 }
-/// Where it is not known of one, that of the other stands for both.
-float error_of_mean(float of_earlier, double count, float value) {
-  if (of_earlier < 0 && value < 0) return std::max(of_earlier, value);
-  if (of_earlier < 0) return value;
-  if (value < 0) return of_earlier;
-  return variance_of_mean(of_earlier, count, value);
+
+/// Variances and errors of the mean, of films whose colours are not yet mixed.
+void tell_scatter(const FilmTile& earlier, double count, FilmTile& film) {
+  float* const error = film.find(kErrorChannel);
+  if (error == nullptr) return;  // what is carried from sweep to sweep is no scatter
+  for (const char* const color : {"R", "G", "B"}) {
+    const std::string layer = fmt::format("variance.{}", color);
+    float* const variance = film.find(layer);
+    if (variance == nullptr) continue;
+    const float *const told = earlier.find(layer), *const before = earlier.find(color),
+                       *const now = film.find(color);
+    for (std::size_t i = 0; i < film.num_pixels(); ++i)
+      variance[i] = variance_of_mean(told[i], before[i], count, now[i]);
+  }
+  const FilmColors before(earlier), now(film);
+  const float* const told = earlier.find(kErrorChannel);
+  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+    if (told[i] == kNoSurface && error[i] == kNoSurface) continue;
+    error[i] = variance_of_mean(std::max(told[i], 0.0f), static_cast<float>(before.grey(i)), count,
+                                static_cast<float>(now.grey(i)));
+  }
 }
 
 using Rule = float (*)(float of_earlier, double count, float value);
 Rule rule_of(const std::string& channel) {
-  if (channel == kErrorChannel) return error_of_mean;
-  if (channel.starts_with("variance.")) return variance_of_mean;
   if (channel == "rounds")
     return [](float of_earlier, double, float value) { return of_earlier + value; };
   if (channel == "material" || channel == "object")
@@ -76,8 +92,11 @@ Status add_sweeps(FilmTile earlier, Sweep sweep, FilmTile& film) {
                              earlier.rect.x0, earlier.rect.y0, fmt::join(earlier.channels, " "),
                              film.rect.x0, film.rect.y0, fmt::join(film.channels, " "))};
   }
+  tell_scatter(earlier, num_sweeps, film);
   for (std::size_t channel = 0; channel < film.channels.size(); ++channel) {
-    if (film.channels[channel].starts_with("Crypto")) continue;  // below, a layer at a time
+    const std::string& name = film.channels[channel];
+    if (name.starts_with("Crypto")) continue;  // below, a layer at a time
+    if (name == kErrorChannel || name.starts_with("variance.")) continue;
     const Rule rule = rule_of(film.channels[channel]);
     const float* const before = earlier.plane(channel);
     float* const now = film.plane(channel);

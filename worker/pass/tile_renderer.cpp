@@ -105,7 +105,7 @@ class TileWalk {
     std::optional<RoundMean> unseen;
     if (first < Round(0)) unseen.emplace(context_.job, rect_);
     std::shared_ptr<const FrameLight> probe_light;
-    if (tells_noise(context_.job)) {
+    if (tells_noise(context_.job) && context_.job.quality.rounds == 1) {
       BATON_ASSIGN(probe_light, light_of(frame, kProbeRound));
     }
     for (Round round = first; round < Round(context_.job.quality.rounds); ++round) {

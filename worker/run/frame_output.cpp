@@ -168,6 +168,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
   add("baton:rotationDeg", rotation_deg_at(environment, frame));
   if (quality.noise_source != NoiseSource::none) {
     metadata.emplace_back("baton:noise", fmt::format("{:.4g}", quality.noise));
+    metadata.emplace_back("baton:noiseShown", fmt::format("{:.4g}", quality.noise_shown));
     add("baton:noiseFrom", noise_source_name(quality.noise_source));
   }
   if (quality.cycles_noise > 0)

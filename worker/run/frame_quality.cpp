@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "common/image/noise.h"
 
@@ -38,6 +39,12 @@ void judge_values(const FilmColors& colors, FrameQuality& quality) {
   quality.light_below_zero = sum > 0 ? static_cast<float>(below / sum) : 0.0f;
 }
 
+/// Whether all pixels tell their error.
+bool is_scatter(const FilmTile& image) {
+  const std::span<const float> errors(image.find(kErrorChannel), image.num_pixels());
+  return std::ranges::find(errors, kErrorUnknown) == errors.end();
+}
+
 }  // namespace
 
 FrameQuality judge_frame(const FilmTile& image) {
@@ -49,7 +56,8 @@ FrameQuality judge_frame(const FilmTile& image) {
   if (const FrameNoise noise = noise_of_film(image); noise.is_told()) {
     quality.noise = noise.relative();
     quality.noise_error = noise.error_share();
-    quality.noise_source = NoiseSource::probes;
+    quality.noise_shown = noise_as_shown(image);
+    quality.noise_source = is_scatter(image) ? NoiseSource::scatter : NoiseSource::probes;
   }
   return quality;
 }

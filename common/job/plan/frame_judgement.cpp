@@ -77,9 +77,16 @@ void find_odd_frames(std::span<const FrameReport* const> written, Judgement& jud
   }
 }
 
-/// Enters the noise of a frame that tells it. squares: the sum over these frames.
-void add_noise(const FrameReport& frame, double& squares, Judgement& judgement) {
-  const float noise = frame.quality.noise;
+/// Earlier programs had other measures.
+bool is_told(NoiseSource source) {
+  return source == NoiseSource::probes || source == NoiseSource::scatter;
+}
+
+/// Enters the noise of a frame that tells it. squares, squares_shown: sums over these frames.
+void add_noise(const FrameReport& frame, double& squares, double& squares_shown,
+               Judgement& judgement) {
+  const float noise = frame.quality.noise, shown = frame.quality.noise_shown;
+  squares_shown += double{shown} * shown;
   const bool is_first = judgement.frames_told == 0;
   squares += double{noise} * noise;
   judgement.noise_least = is_first ? noise : std::min(judgement.noise_least, noise);
@@ -96,7 +103,7 @@ void add_noise(const FrameReport& frame, double& squares, Judgement& judgement) 
 Judgement judge_frames(std::span<const FrameReport> frames) {
   Judgement judgement;
   std::vector<const FrameReport*> written;
-  double squares = 0, light = 0, below = 0;
+  double squares = 0, squares_shown = 0, light = 0, below = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const SamplingStats& sampling = frames[i].sampling;
     judgement.carries |= sampling.pixels_carried > 0;
@@ -107,7 +114,7 @@ Judgement judge_frames(std::span<const FrameReport> frames) {
     const FrameQuality& quality = frames[i].quality;
     if (quality.pixels == 0) continue;
     written.push_back(&frames[i]);
-    if (quality.noise_source == NoiseSource::probes) add_noise(frames[i], squares, judgement);
+    if (is_told(quality.noise_source)) add_noise(frames[i], squares, squares_shown, judgement);
     const double frame_light = double{quality.mean} * static_cast<double>(quality.pixels);
     light += frame_light;
     below += quality.light_below_zero * frame_light;
@@ -124,6 +131,8 @@ Judgement judge_frames(std::span<const FrameReport> frames) {
   if (judgement.frames_told > 0) {
     judgement.noise =
         static_cast<float>(std::sqrt(squares / static_cast<double>(judgement.frames_told)));
+    judgement.noise_shown =
+        static_cast<float>(std::sqrt(squares_shown / static_cast<double>(judgement.frames_told)));
   }
   judgement.light_below_zero = light > 0 ? static_cast<float>(below / light) : 0.0f;
   find_odd_frames(written, judgement);

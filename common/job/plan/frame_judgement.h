@@ -20,7 +20,8 @@ struct Judgement {
   std::uint64_t frames = 0;
   std::uint64_t frames_told = 0;  ///< whose noise is told
   NoiseSource noise_source = NoiseSource::none;
-  float noise = 0;  ///< rms over these frames
+  float noise = 0;        ///< rms over these frames
+  float noise_shown = 0;  ///< the same as shown
   float noise_least = 0, noise_most = 0;
   FrameNumber noisiest{};  ///< the frame of noise_most
   std::vector<OddFrame> odd;

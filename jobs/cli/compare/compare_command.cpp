@@ -47,9 +47,9 @@ struct Compared {
   double noise = 0;  ///< FrameNoise::relative(), rms over frames
 };
 
-/// The first frames of job `number` with another seed, which sees the same points of the scene.
+/// The first frames of job `number` with another seed, whose sites are its own.
 JobSpec with_seed(JobSpec job, std::size_t number, std::uint64_t more, const fs::path& folder) {
-  if (job.image.site_seed == 0) job.image.site_seed = std::max<std::uint64_t>(job.seed, 1);
+  job.image.site_seed = 0;
   job.seed += more;
   job.frames.resize(std::min(job.frames.size(), kSeedFrames));
   job.name = fmt::format("job {} seed {}", number + 1, job.seed);
@@ -142,7 +142,8 @@ void print_table(const std::vector<Compared>& jobs, bool with_noise, const fs::p
   }
   if (with_noise)
     fmt::print(
-        "noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds\n");
+        "noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds "
+        "and their sites\n");
   fmt::print("handed on: sample state, packed, from frame to frame\n");
   fmt::print("sheet, a row for each job: {}\n", sheet.string());
 }

@@ -201,7 +201,7 @@ TEST_F(JournalTest, ANewerJournalIsRefused) {
   const Result<Journal> journal = Journal::open(path);
   ASSERT_FALSE(journal.ok());
   EXPECT_EQ(journal.error().kind, ErrorKind::version);
-  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 7"));
+  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 8"));
 }
 
 TEST_F(JournalTest, AnotherProgramsDatabaseIsRefused) {

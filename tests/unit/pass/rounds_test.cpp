@@ -185,7 +185,7 @@ TEST(RoundMean, EveryAovHasItsMeaning) {
                      .mask = 1,
                      .material = 3,
                      .blocked = {1, 2, 3},
-                     .error = 0.2f};
+                     .error = 100};
   PixelResult half = bright;
   half.radiance = {1, 1, 1};
   half.coverage = half.alpha = 0.5f;
@@ -195,7 +195,6 @@ TEST(RoundMean, EveryAovHasItsMeaning) {
   half.depth = 5;
   half.mask = 0;
   half.material = 4;
-  half.error = 0.7f;
   const PixelResult nothing{.radiance = {1, 1, 1}};
   const FilmTile film = mean_of(Method::pool, {nothing, bright, half});
   const auto value = [&](const char* name) { return channel(film, name)[0]; };
@@ -209,13 +208,11 @@ TEST(RoundMean, EveryAovHasItsMeaning) {
   EXPECT_FLOAT_EQ(value("mask"), 0.5f) << "of two rounds";
   EXPECT_FLOAT_EQ(value("source.G"), 1);
   EXPECT_EQ(value("material"), 3) << "of the first that sees one";
-  EXPECT_FLOAT_EQ(value("variance.G"), 3.0f / 3) << "of 1, 4 and 1, a third of it";
+  EXPECT_FLOAT_EQ(value("variance.G"), 1.5f * 1.5f * 2 / 9) << "1, and 2.5 of the other two";
   EXPECT_FLOAT_EQ(value("blocked.B"), 6.0f / 3);
   EXPECT_FLOAT_EQ(value("unshadowed.B"), 4);
-  EXPECT_FLOAT_EQ(value(kErrorChannel), 0.9f / 9);
+  EXPECT_FLOAT_EQ(value(kErrorChannel), value("variance.G")) << "grey";
   EXPECT_EQ(channel(mean_of(Method::pool, {nothing, nothing}), kErrorChannel)[0], kNoSurface);
-  bright.error = half.error = kErrorUnknown;
-  EXPECT_EQ(channel(mean_of(Method::pool, {bright, half}), kErrorChannel)[0], kErrorUnknown);
   EXPECT_FLOAT_EQ(channel(mean_of(Method::pool, {nothing, nothing}), "mask")[0], 0.5f);
 }
 
@@ -232,17 +229,18 @@ TEST(RoundMean, ARoundAloneIsAsItWas) {
   EXPECT_EQ(channel(film, "variance.B")[0], 0.3f);
 }
 
-TEST(RoundMean, VarianceIsTheScatterOfRounds) {
+TEST(RoundMean, VarianceIsTheDistanceOfTheHalves) {
   std::vector<PixelResult> rounds(4);
   for (std::size_t i = 0; i < 4; ++i) {
     const auto value = static_cast<float>(i);
-    rounds[i] = {.radiance = {value, 2 * value, 5}, .variance = {100, 100, 100}};
+    rounds[i] = {.radiance = {value, 2 * value, 5}, .coverage = 1, .variance = {100, 100, 100}};
   }
-  // 1.25 x 4 / 3 of one, a quarter of it of the mean.
+  // 0.5 and 2.5: a quarter of the square of their distance.
   const FilmTile film = mean_of(Method::bidirectional, rounds);
-  EXPECT_FLOAT_EQ(channel(film, "variance.R")[0], 1.25f / 3);
-  EXPECT_FLOAT_EQ(channel(film, "variance.G")[0], 4 * 1.25f / 3);
+  EXPECT_FLOAT_EQ(channel(film, "variance.R")[0], 1);
+  EXPECT_FLOAT_EQ(channel(film, "variance.G")[0], 4);
   EXPECT_EQ(channel(film, "variance.B")[0], 0);
+  EXPECT_FLOAT_EQ(channel(film, kErrorChannel)[0], 1) << "of grey";
   EXPECT_EQ(channel(mean_of(Method::sequential, rounds), "variance.R")[0], 0) << "rounds correlate";
 }
 
@@ -256,7 +254,7 @@ TEST(RoundMean, RoundsHaveWeights) {
   RoundMean mean(job, {0, 0, 1, 1});
   const std::array<float, 4> values{1, 3, 4, 6};
   for (std::size_t i = 0; i < 4; ++i) {
-    PixelResult pixel{.radiance = {values[i], values[i], values[i]}, .error = 0.5f};
+    PixelResult pixel{.radiance = {values[i], values[i], values[i]}};
     pixel.coverage = pixel.alpha = i == 3 ? 1.0f : 0.0f;
     pixel.depth = 7;
     pixel.blocked = {1, values[i], 1};
@@ -275,7 +273,7 @@ TEST(RoundMean, RoundsHaveWeights) {
   EXPECT_FLOAT_EQ(value("blocked.G"), value("R"));
   // Both pairs have the variance 2, their means half of it, and weigh 2 and 16 of 18.
   EXPECT_FLOAT_EQ(value("variance.R"), (4 + 256) / 324.0f);
-  EXPECT_FLOAT_EQ(value(kErrorChannel), 64 * 0.5f / 324);
+  EXPECT_FLOAT_EQ(value(kErrorChannel), (4 + 256) / 324.0f);
 }
 
 // Of 10 rounds one after those that judge: its distance from their mean, 6, is all that is known.

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "common/image/noise.h"
 #include "tests/support/render_tiled.h"
 #include "worker/pass/sweep_mean.h"
 
@@ -63,16 +64,43 @@ FilmTile film_of(std::vector<std::string> channels, std::vector<float> values) {
   return {.rect = {4, 2, 6, 3}, .channels = std::move(channels), .values = std::move(values)};
 }
 
-TEST(SweepMean, WeighsSweepsAlike) {
-  const FilmTile earlier = film_of({"R", "variance.G", "error"}, {1, 2, .3f, .6f, .2f, -1});
-  FilmTile film = film_of({"R", "variance.G", "error"}, {5, 2, .6f, 0, -1, -1});
-  ASSERT_TRUE(add_sweeps(earlier, Sweep(3), film));
-  EXPECT_EQ(film.values[0], 2);  // (3 * 1 + 5) / 4
-  EXPECT_EQ(film.values[1], 2);
-  EXPECT_FLOAT_EQ(film.values[2], (9 * .3f + .6f) / 16);
-  EXPECT_FLOAT_EQ(film.values[3], 9 * .6f / 16);
-  EXPECT_EQ(film.values[4], .2f) << "known of one";
-  EXPECT_EQ(film.values[5], -1);
+/// A film of two pixels of one grey each.
+FilmTile grey_film(float first, float second, float error) {
+  return film_of({"R", "G", "B", "variance.G", "error"},
+                 {first, second, first, second, first, second, 9, 9, error, error});
+}
+
+// Variance and error are the scatter of the sweeps over their number, whatever each of them said.
+TEST(SweepMean, WeighsSweepsAlikeAndTellsTheirScatter) {
+  FilmTile mean = grey_film(1, 2, kErrorUnknown);
+  const std::vector<std::pair<float, float>> sweeps{{5, 2}, {3, 2}, {7, 10}};
+  for (std::size_t i = 0; i < sweeps.size(); ++i) {
+    FilmTile film = grey_film(sweeps[i].first, sweeps[i].second, i == 1 ? 0.3f : kErrorUnknown);
+    ASSERT_TRUE(add_sweeps(std::move(mean), Sweep(static_cast<std::int32_t>(i) + 1), film));
+    mean = std::move(film);
+  }
+  EXPECT_FLOAT_EQ(mean.values[0], 4);  // 1, 5, 3, 7
+  EXPECT_FLOAT_EQ(mean.values[1], 4);  // 2, 2, 2, 10
+  EXPECT_NEAR(mean.find("variance.G")[0], (9 + 1 + 1 + 9) / 3.0 / 4, 1e-5);
+  EXPECT_NEAR(mean.find("variance.G")[1], (4 + 4 + 4 + 36) / 3.0 / 4, 1e-5);
+  EXPECT_NEAR(mean.find("error")[0], (9 + 1 + 1 + 9) / 3.0 / 4, 1e-5);
+  EXPECT_NEAR(mean.find("error")[1], (4 + 4 + 4 + 36) / 3.0 / 4, 1e-5);
+}
+
+TEST(SweepMean, APixelThatOneSweepSeesHasAnError) {
+  const FilmTile earlier = grey_film(1, 1, kNoSurface);
+  FilmTile film = grey_film(1, 3, kNoSurface);
+  film.find("error")[1] = 0.5f;
+  ASSERT_TRUE(add_sweeps(earlier, Sweep(1), film));
+  EXPECT_EQ(film.find("error")[0], kNoSurface);
+  EXPECT_FLOAT_EQ(film.find("error")[1], 1);
+}
+
+TEST(SweepMean, WhatIsCarriedFromSweepToSweepTellsNoError) {
+  FilmTile earlier = film_of({"R", "variance.R"}, {1, 1, 0, 0});
+  FilmTile film = film_of({"R", "variance.R"}, {3, 3, 0, 0});
+  ASSERT_TRUE(add_sweeps(earlier, Sweep(1), film));
+  EXPECT_EQ(film.find("variance.R")[0], 0);
 }
 
 TEST(SweepMean, LeavesOutWhatSeesNoSurface) {

@@ -219,7 +219,7 @@ TEST(FrameOutput, ErrorsTellTheNoiseAndStayOutOfTheFrame) {
   image.channels.insert(image.channels.begin() + 1, kErrorChannel);
   image.values.insert(image.values.begin() + 200, 200, 0.04f);
   const FrameQuality seen = write_frame(job, {3, 4}, FrameIndex(0), image).value().quality;
-  EXPECT_EQ(seen.noise_source, NoiseSource::probes);
+  EXPECT_EQ(seen.noise_source, NoiseSource::scatter);
   EXPECT_NEAR(seen.noise, 0.2f / seen.mean, 1e-4f);
   const FilmTile stored = read_exr(frame_path(job, FrameIndex(0))).value();
   EXPECT_EQ(stored.find(kErrorChannel), nullptr);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -24,6 +25,50 @@ TEST(FrameQuality, NoiseIsToldByTheErrorsOfAFilm) {
   EXPECT_EQ(seen.noise_source, NoiseSource::probes);
   EXPECT_NEAR(seen.noise, std::sqrt(0.4f) / 4, 1e-5f);
   EXPECT_NEAR(seen.noise_error, std::sqrt(0.36f / 3) / 2, 1e-5f);
+}
+
+// The measure of quality.noiseThreshold: a corner that is noisy counts, one square of 400 does not.
+TEST(FrameQuality, TheNoisyCornerDecidesAThreshold) {
+  const auto of = [](int noisy_squares) {
+    FilmTile image = film(320, 320, {"R", "G", "B", "A", kErrorChannel}, 1);
+    for (std::size_t i = 0; i < image.num_pixels(); ++i) {
+      const std::size_t square = i % 320 / 16 + 20 * (i / 320 / 16);
+      image.plane(4)[i] = square < static_cast<std::size_t>(noisy_squares) ? 0.25f : 0.0001f;
+    }
+    return judge_frame(image);
+  };
+  const auto noise = [](double variance) { return std::sqrt(cycles_noise_squared(variance, 1)); };
+  EXPECT_NEAR(of(0).cycles_noise, noise(0.0001), 1e-6);
+  EXPECT_NEAR(of(4).cycles_noise, noise(0.0001), 1e-6) << "a hundredth of the squares";
+  EXPECT_NEAR(of(5).cycles_noise, noise(0.25), 1e-5);
+  EXPECT_EQ(of(5).noise_source, NoiseSource::scatter);
+}
+
+TEST(FrameQuality, SquaresWithFewSurfacesAreOneAndProbesDecideNothing) {
+  FilmTile image = film(16, 16, {"R", "G", "B", "A", kErrorChannel}, 1);
+  for (std::size_t i = 0; i < image.num_pixels(); ++i)
+    image.plane(4)[i] = i < 60 ? 0.04f : kNoSurface;
+  EXPECT_NEAR(judge_frame(image).cycles_noise, std::sqrt(cycles_noise_squared(0.04, 1)), 1e-5);
+  image.plane(4)[9] = kErrorUnknown;
+  EXPECT_EQ(judge_frame(image).cycles_noise, 0);
+}
+
+// All pixels grey .3 with a deviation of .1: what is shown at .2 and at .4 times the exposure that
+// shows .3 as .4.
+TEST(FrameQuality, NoiseAsShownFollowsTheCurveOfTheDisplay) {
+  const FilmTile image = film(8, 8, {"R", "G", "B", "A", kErrorChannel}, 0.3f);
+  FilmTile noisy = image;
+  std::fill_n(noisy.plane(4), 64, 0.01f);
+  const double exposure = std::pow((0.4 + 0.055) / 1.055, 2.4) / 0.3;
+  const auto shown = [&](double x) { return 1.055 * std::pow(exposure * x, 1 / 2.4) - 0.055; };
+  EXPECT_NEAR(judge_frame(noisy).noise_shown, (shown(0.4) - shown(0.2)) / 2, 1e-4);
+
+  // What is far past white looks clean.
+  FilmTile bright = noisy;
+  for (std::size_t c = 0; c < 3; ++c) std::fill_n(bright.plane(c), 32, 0.0f);
+  for (std::size_t c = 0; c < 3; ++c) std::fill_n(bright.plane(c) + 32, 32, 100.0f);
+  std::fill_n(bright.plane(4), 32, 0.0f);
+  EXPECT_NEAR(judge_frame(bright).noise_shown, 0, 1e-6);
 }
 
 TEST(FrameQuality, NoiseIsNotToldWithoutErrors) {
