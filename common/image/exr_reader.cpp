@@ -1,3 +1,4 @@
+#include <IexErrnoExc.h>
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -51,6 +52,14 @@ std::optional<std::string> attribute_text(const Imf::Attribute& attribute) {
     return fmt::format("{:02}:{:02}:{:02}:{:02}", t.hours(), t.minutes(), t.seconds(), t.frame());
   }
   return std::nullopt;
+}
+
+/// What OpenEXR threw: the system's word, or that the file is broken.
+Error exr_error(const std::filesystem::path& path, const std::exception& fault) {
+  if (dynamic_cast<const Iex::ErrnoExc*>(&fault) != nullptr)
+    return {ErrorKind::io, fmt::format("{}: cannot read: {}", path.string(), fault.what())};
+  return {ErrorKind::bad_input,
+          fmt::format("{}: not a readable EXR file: {}", path.string(), fault.what())};
 }
 
 PixelRect rect_of(const Imath::Box2i& box) {
@@ -164,8 +173,7 @@ auto with_exr_file(const std::filesystem::path& path, Use use)
     File file(path.c_str(), kOpenExrThreads);
     return use(file);
   } catch (const std::exception& fault) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: not a readable EXR file: {}", path.string(), fault.what())};
+    return exr_error(path, fault);
   }
 }
 
@@ -252,8 +260,7 @@ Result<FilmTile> read_exr_luma_chroma(const std::filesystem::path& path, const s
     }
     return shown == image.rect ? std::move(image) : framed(image, shown);
   } catch (const std::exception& fault) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: not a readable EXR file: {}", path.string(), fault.what())};
+    return exr_error(path, fault);
   }
 }
 

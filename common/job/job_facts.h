@@ -37,8 +37,11 @@ inline bool has_fine_sites(const JobSpec& job) { return job.image.most_sites() >
 bool rounds_have_own_sites(const JobSpec& job);
 /// Rounds before the first step that are not seen: state.preroll, where pixels carry a memory.
 std::int32_t num_preroll_rounds(const JobSpec& job);
-/// Share of the pixels that such a round has: blocks of pixels learn together.
-inline constexpr double kPrerollShare = 0.25;
+/// Such a round has one pixel of each square of so many pixels a side: blocks learn together, and
+/// these are enough to begin with.
+inline constexpr std::int32_t kPrerollSide = 2;
+/// Share of the pixels that it has.
+inline constexpr double kPrerollShare = 1.0 / (kPrerollSide * kPrerollSide);
 
 /// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with
 /// the other, else 1.

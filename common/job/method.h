@@ -49,7 +49,8 @@ struct MethodTraits {
   /// A pixel's state in a file before packing takes at most this beside its source, Lns and
   /// samples.
   std::int32_t most_bytes_beside_samples = 0;
-  /// That of a block of pixels (PixelBlocks).
+  /// A block of pixels (PixelBlocks) takes at most this in a file before packing: what it
+  /// remembers, and the marks of the bins that it does so of. In memory it takes less.
   std::int32_t most_block_bytes = 0;
   /// Its rays are N weighted samples, which are in its states; else rays are chosen apart from
   /// them.

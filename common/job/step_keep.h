@@ -58,6 +58,10 @@ class StepKeep {
     for (const auto& [key, entry] : entries_) values.emplace_back(key, entry.value);
     return values;
   }
+  bool empty() const {
+    const std::lock_guard lock(mutex_);
+    return entries_.empty();
+  }
   /// What all values take.
   std::size_t size_bytes() const {
     const std::lock_guard lock(mutex_);

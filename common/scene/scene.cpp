@@ -27,11 +27,22 @@ using NameIndex = std::unordered_map<std::string, std::uint32_t>;
 /// Collects every fault, so that one run tells all of them.
 class Faults {
  public:
-  void add(const std::string& message) { text_ += (text_.empty() ? "" : "\n") + message; }
+  void add(const std::string& message) { add(message, ErrorKind::bad_input); }
+  /// Of `place`.
+  void add(const std::string& place, const Error& error) {
+    add(place + ": " + error.message, error.kind);
+  }
   bool any() const { return !text_.empty(); }
-  Error error() const { return {ErrorKind::bad_input, text_}; }
+  Error error() const { return {kind_, text_}; }
 
  private:
+  /// Looking again helps where all files could but not be read.
+  void add(const std::string& message, ErrorKind kind) {
+    if (text_.empty() || kind != ErrorKind::io) kind_ = kind;
+    text_ += (text_.empty() ? "" : "\n") + message;
+  }
+
+  ErrorKind kind_ = ErrorKind::bad_input;
   std::string text_;
 };
 
@@ -139,13 +150,13 @@ Material load_material(const MaterialSpec& spec, const std::string& name, Detail
     if (detail) {
       material.detail = std::move(*detail);
     } else {
-      faults.add(name + ": " + detail.error().message);
+      faults.add(name, detail.error());
     }
     return material;
   }
   Result<std::shared_ptr<const MeasuredBrdf>> table = MeasuredBrdf::load(spec.file);
   if (table) return make_measured_material(std::move(*table));
-  faults.add(name + ": " + table.error().message);
+  faults.add(name, table.error());
   return {};
 }
 
@@ -201,7 +212,7 @@ NameIndex load_meshes(const SceneSpec& spec, gltf::FileCache& files, Scene& scen
   for (const auto& [name, mesh_spec] : spec.meshes) {
     names[name] = static_cast<std::uint32_t>(scene.meshes.size());
     Result<TriangleMesh> mesh = load_part(mesh_spec, textured.contains(name), files, motions);
-    if (!mesh) faults.add("scene.meshes." + name + ": " + mesh.error().message);
+    if (!mesh) faults.add("scene.meshes." + name, mesh.error());
     scene.meshes.push_back(mesh ? std::move(*mesh) : TriangleMesh{});
   }
   return names;

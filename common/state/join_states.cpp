@@ -27,18 +27,23 @@ std::size_t pixel_at(const PixelRect& rect, std::int32_t x, std::int32_t y) {
          static_cast<std::size_t>(x - rect.x0);
 }
 
-/// Copies what blocks carry, each from the part that it lies in.
-void copy_blocks(std::span<const SampleState* const> parts, SampleState& to) {
-  if (to.block_planes.empty()) return;
+/// Copies what blocks carry, each from the part that it lies in. Returns how many lie in none
+/// whole, which carry nothing then.
+std::size_t copy_blocks(std::span<const SampleState* const> parts, SampleState& to) {
+  if (to.block_planes.empty()) return 0;
   const PixelBlocks blocks(to.rect);
+  std::size_t num_cut = 0;
   for (std::size_t block = 0; block < blocks.count(); ++block) {
     const PixelRect pixels = blocks.pixels(block);
-    for (const SampleState* const part : parts) {
-      if (!part->rect.contains(pixels)) continue;
-      to.copy_block(*part, PixelBlocks(part->rect).at(pixels.x0, pixels.y0), block);
-      break;
+    const auto part = std::ranges::find_if(
+        parts, [&](const SampleState* state) { return state->rect.contains(pixels); });
+    if (part == parts.end()) {
+      ++num_cut;
+    } else {
+      to.copy_block(**part, PixelBlocks((*part)->rect).at(pixels.x0, pixels.y0), block);
     }
   }
+  return num_cut;
 }
 
 }  // namespace
@@ -72,9 +77,12 @@ Result<SampleState> join_states(std::span<const SampleState* const> parts, const
       num_covered += shared.x1 - shared.x0;
     }
   }
-  copy_blocks(parts, joined);
   if (num_covered != rect.area())
     return fail(fmt::format("they cover {} of {} pixels", num_covered, rect.area()));
+  if (const std::size_t num_cut = copy_blocks(parts, joined); num_cut > 0) {
+    return fail(fmt::format("{} of {} blocks of {} x {} pixels lie in none of them whole", num_cut,
+                            joined.num_blocks(), PixelBlocks::kSide, PixelBlocks::kSide));
+  }
   return joined;
 }
 

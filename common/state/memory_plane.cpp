@@ -132,7 +132,7 @@ std::vector<SectionTag> MemoryFormat::tags() const {
 void MemoryFormat::encode(const SampleState& state, StateWriter& out) const {
   SampleFormat::encode(state, out);
   for (std::size_t plane = 0; plane < num_planes(); ++plane)
-    encode_blocks(block_memory_plane(state, plane == 1), kBlockTags[plane], out);
+    encode_blocks(block_memory_plane(state, plane), kBlockTags[plane], out);
   ByteWriter light_noise, lobe_noise, tallies;
   const std::span<const PixelMemory> memories = pixel_memory_plane(state);
   for (const std::size_t pixel : out.pixels()) {
@@ -152,8 +152,7 @@ void MemoryFormat::encode(const SampleState& state, StateWriter& out) const {
 Status MemoryFormat::decode(const StateReader& from, SampleState& state) const {
   BATON_TRY(SampleFormat::decode(from, state));
   for (std::size_t plane = 0; plane < num_planes(); ++plane) {
-    BATON_TRY(
-        decode_blocks(from, kBlockTags[plane], state.rect, block_memory_plane(state, plane == 1)));
+    BATON_TRY(decode_blocks(from, kBlockTags[plane], state.rect, block_memory_plane(state, plane)));
   }
   BATON_ASSIGN(const Column light, noises_of(from, kLightNoise));
   BATON_ASSIGN(const Column lobes, noises_of(from, kLobeNoise));
@@ -178,24 +177,24 @@ Status MemoryFormat::decode(const StateReader& from, SampleState& state) const {
 
 void MemoryFormat::inherit_block(std::span<const BlockSource> sources, SampleState& state,
                                  std::size_t block) const {
-  for (const bool catchers : {false, true}) {
+  for (std::size_t plane = 0; plane < num_planes(); ++plane) {
     std::uint32_t of_all = 0;
     for (const BlockSource& source : sources) {
-      if (source.for_catchers == catchers) of_all += static_cast<std::uint32_t>(source.num_pixels);
+      if (source.plane == plane) of_all += static_cast<std::uint32_t>(source.num_pixels);
     }
     if (of_all == 0) continue;
     // Fixed point, rounded down: no bin gets more free rays than rays.
     std::array<std::uint32_t, BlockMemory::kCount> seen{}, free{};
     for (const BlockSource& source : sources) {
-      if (source.for_catchers != catchers) continue;
-      const BlockMemory& old = block_memory_plane(*source.state, catchers)[source.block];
+      if (source.plane != plane) continue;
+      const BlockMemory& old = block_memory_plane(*source.state, plane)[source.block];
       const auto share = static_cast<std::uint32_t>(source.num_pixels) * (1u << 15) / of_all;
       for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
         seen[i] += share * old.cells[i].seen;
         free[i] += share * old.cells[i].free;
       }
     }
-    BlockMemory& memory = block_memory_plane(state, catchers)[block];
+    BlockMemory& memory = block_memory_plane(state, plane)[block];
     for (std::size_t i = 0; i < BlockMemory::kCount; ++i) {
       memory.cells[i] = {static_cast<std::uint8_t>(seen[i] >> 16),
                          static_cast<std::uint8_t>(free[i] >> 16)};

@@ -46,13 +46,13 @@ inline std::span<const PixelMemory> pixel_memory_plane(const SampleState& state)
   return state.planes[SampleFormat::kNumPlanes].values<PixelMemory>();
 }
 
-/// (blocks) of a state of memory_format(), of the pixels that see a catcher or of the others.
-inline std::span<BlockMemory> block_memory_plane(SampleState& state, bool of_catchers = false) {
-  return state.block_planes[of_catchers ? 1 : 0].values<BlockMemory>();
+/// (blocks) of a state of memory_format(). plane: StateFormat::block_plane_of().
+inline std::span<BlockMemory> block_memory_plane(SampleState& state, std::size_t plane = 0) {
+  return state.block_planes[plane].values<BlockMemory>();
 }
 inline std::span<const BlockMemory> block_memory_plane(const SampleState& state,
-                                                       bool of_catchers = false) {
-  return state.block_planes[of_catchers ? 1 : 0].values<BlockMemory>();
+                                                       std::size_t plane = 0) {
+  return state.block_planes[plane].values<BlockMemory>();
 }
 
 }  // namespace baton

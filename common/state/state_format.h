@@ -65,6 +65,10 @@ class StateFormat {
  public:
   virtual ~StateFormat() = default;
 
+  /// The plane of the blocks that a pixel's rays go into: pixels that see a catcher of shadows have
+  /// one of their own in jobs that have catchers.
+  static constexpr std::size_t block_plane_of(bool sees_catcher) { return sees_catcher ? 1 : 0; }
+
   /// Fewest particles of a pixel.
   virtual std::int32_t fewest_particles() const { return 0; }
   /// Bytes of a pixel in each plane.
@@ -90,12 +94,12 @@ class StateFormat {
   virtual void move_to_sites(SampleState& /*state*/, std::size_t /*pixel*/,
                              const HeirOf& /*heir_of*/) const {}
 
-  /// A block of the frame before, and how many pixels of a block of now come from it: those that
-  /// see a catcher of shadows, or the others.
+  /// A block of the frame before, and how many pixels of a block of now come from it, of those
+  /// that a plane of the blocks is of.
   struct BlockSource {
     const SampleState* state;
     std::size_t block;
-    bool for_catchers;
+    std::size_t plane;
     std::int32_t num_pixels;
   };
   /// Fills what a block carries, all zero, where surfaces have moved.

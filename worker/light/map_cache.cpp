@@ -1,5 +1,6 @@
 #include "worker/light/map_cache.h"
 
+#include "common/base/patiently.h"
 #include "common/scene/map/map_reduction.h"
 
 namespace baton {
@@ -11,11 +12,12 @@ Result<MapCache::MapPtr> MapCache::get(const std::string& path, const Environmen
                 hidden, capped_share};
   const std::lock_guard lock(reading_);
   if (MapPtr found = maps_.find(key)) return found;
-  Result<RgbImage> read = read_rgb_image(path);
-  // Its reader may take an error of the moment for a broken file.
-  if (!read && read.error().kind == ErrorKind::bad_input) read = read_rgb_image(path);
-  BATON_ASSIGN(const RgbImage image, std::move(read));
-  BATON_TRY(is_unchanged_(path));
+  const auto read = [&]() -> Result<RgbImage> {
+    BATON_ASSIGN(RgbImage image, read_(path));
+    BATON_TRY(is_unchanged_(path));
+    return image;
+  };
+  BATON_ASSIGN(const RgbImage image, patiently(read));
   reports_.insert_or_assign({path, environment.scale},
                             report_map(path, image, environment.scale, environment.max_width));
   return maps_.insert(key, std::make_shared<const EnvironmentMap>(

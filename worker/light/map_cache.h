@@ -9,6 +9,7 @@
 
 #include "common/base/lru_cache.h"
 #include "common/base/result.h"
+#include "common/image/image_io.h"
 #include "common/job/job_spec.h"
 #include "common/scene/map/map_report.h"
 #include "worker/surface/environment.h"
@@ -21,8 +22,13 @@ class MapCache {
  public:
   using MapPtr = std::shared_ptr<const EnvironmentMap>;
 
-  explicit MapCache(const MemorySharePtr& share)
-      : maps_(share, [](const EnvironmentMap& map) { return map.size_bytes(); }) {}
+  using Reader = std::function<Result<RgbImage>(const std::string& path)>;
+
+  explicit MapCache(
+      const MemorySharePtr& share,
+      Reader read = [](const std::string& path) { return read_rgb_image(path); })
+      : read_(std::move(read)),
+        maps_(share, [](const EnvironmentMap& map) { return map.size_bytes(); }) {}
 
   /// is_unchanged: asked of each file once it is read: an error says that it is not the one that is
   /// meant. Before the first get().
@@ -30,7 +36,8 @@ class MapCache {
     is_unchanged_ = std::move(is_unchanged);
   }
   /// The map of a file with the size and table that `environment` and the other arguments, those
-  /// of EnvironmentMap, ask for. Error: a map that cannot be read, or has changed.
+  /// of EnvironmentMap, ask for. A disk that is away for a moment is waited for. Error: a map that
+  /// cannot be read, or has changed.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
                      const HiddenCone& hidden = {}, float capped_share = 0);
   /// What is known of a map that was got with this scale; nothing of a map that was not.
@@ -49,6 +56,7 @@ class MapCache {
     auto operator<=>(const Key&) const = default;
   };
 
+  const Reader read_;
   std::function<Status(const std::string& path)> is_unchanged_ = [](const auto&) {
     return Status();
   };

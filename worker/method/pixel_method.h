@@ -64,6 +64,7 @@ inline kernels::CandidateSource candidate_source(const PixelInput& input,
 struct PixelState {
   SampleState& tile;
   std::size_t index;
+  bool sees_catcher = false;  ///< a catcher of shadows
 };
 
 /// What a method says about its work on a pixel. The state has the pixel's source.

@@ -28,7 +28,7 @@ Rgb AsideSampler::sample(const PixelMethod& method, const PixelInput& input, con
                    .start = {.has_history = input.start.has_history && !aside.starts_afresh},
                    .hits = aside.hits,
                    .geometry = input.geometry},
-                  {state_, 0}, writer);
+                  {state_, 0, pixel.sees_catcher}, writer);
   input.geometry->accel->occluded(rays_.rays);
   return writer.known.color + sum_free(rays_, 0, rays_.size()).color;
 }

@@ -75,7 +75,8 @@ Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, Catc
                                     .presampled = input.presampled,
                                     .key = key,
                                     .starts_afresh = true};
-  return aside_.sample(method, input, catcher, pixel) + dark_share(hits_, sites_);
+  return aside_.sample(method, input, catcher, {pixel.tile, pixel.index, true}) +
+         dark_share(hits_, sites_);
 }
 
 }  // namespace baton

@@ -5,16 +5,28 @@
 
 namespace baton {
 
+void PixelOrder::close(std::size_t count) {
+  const std::size_t end = (ends_.empty() ? 0 : ends_.back()) + count;
+  const std::size_t begin = ends_.size() < 2 ? 0 : ends_[ends_.size() - 2];
+  if (ends_.empty() || end - begin > most_) {
+    ends_.push_back(end);
+  } else {
+    ends_.back() = end;
+  }
+}
+
+void PixelOrder::append(std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i)
+    slots_.push_back(static_cast<std::uint32_t>(slots_.size()));
+  close(count);
+}
+
 PixelOrder::PixelOrder(const PixelRect& rect, const RoundPixels& pixels, bool by_blocks,
                        std::size_t most)
-    : slots_(pixels.size()) {
+    : most_(most) {
   if (!by_blocks) {
-    std::iota(slots_.begin(), slots_.end(), 0u);
-    for (std::size_t end = std::min(most, slots_.size()); !slots_.empty();
-         end = std::min(end + most, slots_.size())) {
-      ends_.push_back(end);
-      if (end == slots_.size()) break;
-    }
+    for (std::size_t first = 0; first < pixels.size(); first += most)
+      append(std::min(most, pixels.size() - first));
     return;
   }
 
@@ -28,18 +40,14 @@ PixelOrder::PixelOrder(const PixelRect& rect, const RoundPixels& pixels, bool by
   }
   std::partial_sum(first.begin(), first.end(), first.begin());
   std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  slots_.resize(pixels.size());
   for (std::size_t slot = 0; slot < pixels.size(); ++slot)
     slots_[next[block_of[slot]]++] = static_cast<std::uint32_t>(slot);
 
   // As many whole blocks as a batch has room for.
-  std::size_t begin = 0;
   for (std::size_t block = 0; block < blocks.count(); ++block) {
-    if (first[block + 1] - begin > most) {
-      ends_.push_back(first[block]);
-      begin = first[block];
-    }
+    if (const std::size_t count = first[block + 1] - first[block]; count > 0) close(count);
   }
-  if (begin < slots_.size()) ends_.push_back(slots_.size());
 }
 
 }  // namespace baton

@@ -16,7 +16,12 @@ namespace baton {
 class PixelOrder {
  public:
   /// most: pixels of a batch, at least those of a block.
+  explicit PixelOrder(std::size_t most) : most_(most) {}
   PixelOrder(const PixelRect& rect, const RoundPixels& pixels, bool by_blocks, std::size_t most);
+
+  /// Appends the `count` slots after the last one, which stay together: to the last batch, or where
+  /// that has no room for them, as a new one. count: [1, most].
+  void append(std::size_t count);
 
   std::size_t num_batches() const { return ends_.size(); }
   std::span<const std::uint32_t> batch(std::size_t i) const {
@@ -25,6 +30,10 @@ class PixelOrder {
   }
 
  private:
+  /// So many of slots_, after those of the batches, stay together.
+  void close(std::size_t count);
+
+  std::size_t most_;
   std::vector<std::uint32_t> slots_;
   std::vector<std::size_t> ends_;  ///< (batches)
 };

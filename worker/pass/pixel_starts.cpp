@@ -17,7 +17,7 @@ void PixelStarts::begin(const PixelBatch& batch, SampleState& state) {
 bool PixelStarts::find(std::size_t i, std::size_t slot, SampleState& state) {
   const TileSurfaces& surfaces = work_.at.surfaces;
   const std::size_t index = surfaces.pixels.index(slot);
-  const bool sees_catcher = surfaces.first_surface(slot).is_catcher;
+  const bool sees_catcher = surfaces.sees_catcher(slot);
   Found& found = found_[i % 2];
   poison(found.old);
   found.history = PixelHistory::none;

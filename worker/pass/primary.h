@@ -35,6 +35,11 @@ struct TileSurfaces {
   const SurfaceHit& first_surface(std::size_t slot) const {
     return hits[first_hit[slot] + first_site[slot]];
   }
+  /// Whether a pixel is a catcher's of shadows (catcher.h): the one place that says so. Its sites
+  /// see catchers or objects, never both.
+  bool sees_catcher(std::size_t slot) const {
+    return sees_surface(slot) && first_surface(slot).is_catcher;
+  }
   std::span<const SurfaceHit> pixel(std::size_t slot) const { return part(hits, slot); }
   std::span<const Ray> pixel_rays(std::size_t slot) const { return part(rays, slot); }
   /// Textures at the hits of a pixel's sites; empty where the scene has no detail.

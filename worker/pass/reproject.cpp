@@ -128,15 +128,14 @@ void Reprojection::inherit_blocks(const TileSurfaces& surfaces,
       if (slots_[i].history == PixelHistory::none) continue;
       const OldPixels::Place& old = *slots_[i].old;
       const std::size_t from = PixelBlocks(old.state->rect).of(old.index);
-      const bool sees_catcher = surfaces.first_surface(slots[i]).is_catcher;
+      const std::size_t plane = StateFormat::block_plane_of(surfaces.sees_catcher(slots[i]));
       const auto known = std::ranges::find_if(sources, [&](const StateFormat::BlockSource& source) {
-        return source.state == old.state && source.block == from &&
-               source.for_catchers == sees_catcher;
+        return source.state == old.state && source.block == from && source.plane == plane;
       });
       if (known != sources.end()) {
         ++known->num_pixels;
       } else {
-        sources.push_back({old.state, from, sees_catcher, 1});
+        sources.push_back({old.state, from, plane, 1});
       }
     }
     state.format->inherit_block(sources, state, block);

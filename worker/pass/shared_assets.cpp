@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace baton {
 
@@ -33,26 +34,35 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
   return load_shared_assets(job, memory, memory.scene_bytes);
 }
 
-Status verify_asset(const std::vector<AssetDigest>& files, const std::string& path) {
+Status verify_asset(const std::vector<KnownAsset>& files, const std::string& path) {
   const auto found =
-      std::ranges::find_if(files, [&](const AssetDigest& file) { return file.path == path; });
-  return found == files.end() ? Status() : verify_assets({*found});
+      std::ranges::find_if(files, [&](const KnownAsset& known) { return known.file.path == path; });
+  if (found == files.end()) return {};
+  BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
+  return stamp == found->stamp ? Status() : verify_assets({found->file});
 }
 
+AssetShelf::AssetShelf()
+    : AssetShelf([](const JobSpec& job, const MemoryBudget& memory, std::uint64_t most) {
+        return load_shared_assets(job, memory, most);
+      }) {}
+
 Result<std::shared_ptr<const SharedAssets>> AssetShelf::get(const JobSpec& job,
-                                                            const std::vector<AssetDigest>& files,
+                                                            const std::vector<KnownAsset>& files,
                                                             const MemoryBudget& memory,
                                                             std::uint64_t max_scene_bytes) {
+  std::vector<AssetDigest> digests;
+  for (const KnownAsset& known : files) digests.push_back(known.file);
   const std::lock_guard lock(mutex_);
   entries_.remove_if([](const Entry& entry) { return entry.assets.expired(); });
   for (const Entry& entry : entries_) {
     // It may have gone since.
     auto assets = entry.assets.lock();
-    if (assets != nullptr && entry.scene == job.scene && entry.files == files) return assets;
+    if (assets != nullptr && entry.scene == job.scene && entry.files == digests) return assets;
   }
-  BATON_ASSIGN(auto assets, load_shared_assets(job, memory, max_scene_bytes));
+  BATON_ASSIGN(auto assets, load_(job, memory, max_scene_bytes));
   assets->maps->check_with([files](const std::string& path) { return verify_asset(files, path); });
-  entries_.push_front({job.scene, files, assets});
+  entries_.push_front({job.scene, std::move(digests), assets});
   return assets;
 }
 

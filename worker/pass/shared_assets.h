@@ -1,10 +1,13 @@
 #pragma once
 
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
+#include "common/base/file_stamp.h"
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
 #include "common/job/text/job_json.h"
@@ -35,18 +38,32 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
 /// The same with what is usual on this machine.
 Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job);
 
-/// A file that has been read is the one that the job was submitted with. files: with their digests;
-/// one that is not among them may be any. Errors: those of verify_assets().
-Status verify_asset(const std::vector<AssetDigest>& files, const std::string& path);
+/// A file of a job, and how it stood when it had that digest.
+struct KnownAsset {
+  AssetDigest file;
+  FileStamp stamp;
+};
+
+/// A file that has been read is the one that the job was submitted with. It is read again only if
+/// it stands otherwise. files: those of the job; one that is not among them may be any. Errors:
+/// those of stamp_of() and verify_assets().
+Status verify_asset(const std::vector<KnownAsset>& files, const std::string& path);
 
 /// The assets of those jobs that are still in use. Any number of threads may ask; one loads at a
 /// time.
 class AssetShelf {
  public:
-  /// The assets of a living job of equal scene and files, or newly loaded ones. files: every asset
-  /// of the job with its digest, already verified.
+  /// Signature of load_shared_assets().
+  using Loader = std::function<Result<std::shared_ptr<const SharedAssets>>(
+      const JobSpec& job, const MemoryBudget& memory, std::uint64_t max_scene_bytes)>;
+
+  AssetShelf();
+  explicit AssetShelf(Loader load) : load_(std::move(load)) {}
+
+  /// The assets of a living job of equal scene and digests of files, or newly loaded ones. files:
+  /// every asset of the job, already verified.
   Result<std::shared_ptr<const SharedAssets>> get(const JobSpec& job,
-                                                  const std::vector<AssetDigest>& files,
+                                                  const std::vector<KnownAsset>& files,
                                                   const MemoryBudget& memory,
                                                   std::uint64_t max_scene_bytes);
 
@@ -57,6 +74,7 @@ class AssetShelf {
     std::weak_ptr<const SharedAssets> assets;
   };
 
+  const Loader load_;
   std::mutex mutex_;
   std::list<Entry> entries_;
 };

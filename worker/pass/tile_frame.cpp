@@ -8,7 +8,6 @@
 #include "common/job/aov.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/pixel_books.h"
-#include "worker/pass/pixel_order.h"
 
 namespace baton {
 namespace {
@@ -52,10 +51,8 @@ void TileFrameRenderer::render(const TileRound& at, SampleState& state, RoundMea
   RoundWork work(context_, at);
   PixelStarts starts(geometry_, work);
   PixelBatch batch;
-  const PixelOrder order(at.surfaces.rect, at.surfaces.pixels, !state.block_planes.empty(),
-                         PixelBatch::kMost);
-  for (std::size_t i = 0; i < order.num_batches(); ++i) {
-    batch.begin(order.batch(i));
+  for (std::size_t i = 0; i < at.order.num_batches(); ++i) {
+    batch.begin(at.order.batch(i));
     starts.begin(batch, state);
     sample(work, starts, state, batch);
     trace(work, batch);
@@ -99,7 +96,8 @@ void TileFrameRenderer::sample(RoundWork& work, PixelStarts& starts, SampleState
     if (!surfaces.sees_surface(slot)) return;
     const bool has_history = starts.find(i, slot, state);
     sampler_of(surfaces, slot)
-        .look_ahead(work.light, has_history, {state, surfaces.pixels.index(slot)});
+        .look_ahead(work.light, has_history,
+                    {state, surfaces.pixels.index(slot), surfaces.sees_catcher(slot)});
   };
   SiteBlock sites;
   look_ahead(0);
@@ -122,7 +120,7 @@ void TileFrameRenderer::sample(RoundWork& work, PixelStarts& starts, SampleState
                     .hits = surfaces.pixel(slot),
                     .geometry = &geometry_,
                     .wants_unshadowed = wants_unshadowed_},
-                   i, {state, index}, batch);
+                   i, {state, index, surfaces.sees_catcher(slot)}, batch);
     } else {
       see_nothing(work, slot, state);
     }
@@ -145,19 +143,18 @@ void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, s
   const auto sample_edge = [&] {
     return edge_.sample(context_.method, input, work.catchers, pixel);
   };
-  const bool is_catcher = surfaces.first_surface(slot).is_catcher;
-  if (is_catcher && work.at.goes_on && belongs_to_object(pixel.tile, pixel.index)) {
+  if (pixel.sees_catcher && work.at.goes_on && belongs_to_object(pixel.tile, pixel.index)) {
     result.shadow = sample_edge();
     result.catcher = 1;
     return;
   }
 
   const SiteOrigins origins = origins_of(input.hits);
-  if (!is_catcher) sample_again(work, input, i, pixel, origins, batch);
+  if (!pixel.sees_catcher) sample_again(work, input, i, pixel, origins, batch);
   RayWriter rays(origins, batch.rays);
   const PixelDiagnostics did = sampler_of(surfaces, slot).sample(input, pixel, rays);
   batch.known[i] = rays.known;
-  if (is_catcher) {
+  if (pixel.sees_catcher) {
     pixel.tile.set_source(pixel.index, PixelSource::catcher);
     result.shadow = dark_share(input.hits, input.sites);
   } else if (context_.scene->has_catcher) {
@@ -226,7 +223,8 @@ void TileFrameRenderer::shade(RoundWork& work, SampleState& state, PixelBatch& b
     const FoundRays rays{.sample = std::span(batch.rays.sample).subspan(first, count),
                          .tag = std::span(batch.rays.tag).subspan(first, count),
                          .is_free = found.is_free};
-    if (count > 0) sampler_of(surfaces, slot).learn(rays, {state, index});
+    if (count > 0)
+      sampler_of(surfaces, slot).learn(rays, {state, index, surfaces.sees_catcher(slot)});
     if (context_.job.visibility.correlated) collector_.add_rays(state, index, rays);
     first = end;
   }
@@ -248,7 +246,7 @@ void TileFrameRenderer::show(RoundWork& work, PixelBatch& batch, RoundMean& film
   for (std::size_t i = 0; i < batch.count(); ++i) {
     PixelResult& pixel = batch.pixels[i];
     const std::size_t slot = batch.slots[i];
-    if (surfaces.sees_surface(slot) && surfaces.first_surface(slot).is_catcher) {
+    if (surfaces.sees_catcher(slot)) {
       const PixelResult caught = std::exchange(pixel, {});  // which is not in the image
       pixel.shadow = caught.catcher > 0 ? caught.shadow : caught.radiance + caught.shadow;
       pixel.catcher = catcher_share(surfaces.pixel(slot));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -60,18 +61,24 @@ Status check_previous(const RenderContext& context, const TileRun& run,
 constexpr std::size_t kSitesInCache = 4096;
 constexpr std::size_t kPixelsOfBlock = std::size_t{PixelBlocks::kSide} * PixelBlocks::kSide;
 
-/// The pixels of a preroll round: one of each square of 2 x 2, in each round another. Blocks learn
-/// together, and a quarter of their pixels is enough to begin with.
+/// The pixels of a preroll round: one of each square of kPrerollSide, in each round another.
 RoundPixels preroll_pixels(const PixelRect& rect, Round round) {
-  constexpr std::int32_t kTurn[] = {0, 3, 1, 2};
-  const std::int32_t turn = kTurn[-round.value() & 3];
+  constexpr std::int32_t kTurn[] = {0, 3, 1, 2}, kLast = kPrerollSide - 1;
+  static_assert(std::size(kTurn) == std::size_t{kPrerollSide} * kPrerollSide);
+  const std::int32_t turn = kTurn[static_cast<std::size_t>(-round.value()) % std::size(kTurn)];
   RoundPixels pixels;
   for (std::size_t i = 0; i < static_cast<std::size_t>(rect.area()); ++i) {
     const auto [x, y] = rect.place(i);
-    if ((x & 1) + 2 * (y & 1) == turn) pixels.add(i, 1);
+    if ((x & kLast) + kPrerollSide * (y & kLast) == turn) pixels.add(i, 1);
   }
   return pixels;
 }
+
+/// Pixels of a round that are traced together.
+struct RoundPart {
+  RoundPixels pixels;
+  PixelOrder order;
+};
 
 /// A tile on its way through its frames, round by round.
 class TileWalk {
@@ -122,13 +129,15 @@ class TileWalk {
       if (history && whole != nullptr) keep_for_next(frame, whole);
       const bool goes_on = has_history_ && !history;
       renderer_->begin_round(state_, goes_on);
-      for (RoundPixels& part : parts_of(std::move(pixels), whole != nullptr)) {
-        const auto surfaces = surfaces_of(frame.round_of_frame(round), std::move(part), whole);
+      for (RoundPart& part : parts_of(std::move(pixels), whole != nullptr)) {
+        const auto surfaces =
+            surfaces_of(frame.round_of_frame(round), std::move(part.pixels), whole);
         if (is_seen) planes.add(*surfaces);
         renderer_->render({.frame = frame,
                            .round = round,
                            .light = *light,
                            .surfaces = *surfaces,
+                           .order = part.order,
                            .probe_light = is_seen ? probe_light.get() : nullptr,
                            .history = history ? &*history : nullptr,
                            .goes_on = goes_on},
@@ -190,24 +199,27 @@ class TileWalk {
   }
   /// The pixels of a round, as many whole batches at a time as caches have room for; all together
   /// where these are kept.
-  std::vector<RoundPixels> parts_of(RoundPixels pixels, bool are_kept) const {
-    std::vector<RoundPixels> parts;
+  std::vector<RoundPart> parts_of(RoundPixels pixels, bool are_kept) const {
+    std::vector<RoundPart> parts;
+    const bool by_blocks = !state_.block_planes.empty();
     if (are_kept && pixels.are_all(state_.num_pixels())) {
-      parts.push_back(std::move(pixels));
+      PixelOrder order(rect_, pixels, by_blocks, PixelBatch::kMost);
+      parts.push_back({std::move(pixels), std::move(order)});
       return parts;
     }
-    const PixelOrder order(rect_, pixels, !state_.block_planes.empty(), kPixelsOfBlock);
+    const PixelOrder order(rect_, pixels, by_blocks, kPixelsOfBlock);
     std::size_t room = 0;
     for (std::size_t i = 0; i < order.num_batches(); ++i) {
       const std::span<const std::uint32_t> batch = order.batch(i);
       std::size_t sites = 0;
       for (const std::uint32_t slot : batch) sites += num_sites(pixels.index(slot));
       if (sites > room) {
-        parts.emplace_back();
+        parts.push_back({{}, PixelOrder(PixelBatch::kMost)});
         room = std::max(sites, kSitesInCache);
       }
       for (const std::uint32_t slot : batch)
-        parts.back().add(pixels.index(slot), pixels.weight(slot));
+        parts.back().pixels.add(pixels.index(slot), pixels.weight(slot));
+      parts.back().order.append(batch.size());
       room -= sites;
     }
     return parts;

@@ -10,6 +10,7 @@
 #include "worker/pass/catcher_albedo.h"
 #include "worker/pass/film_writer.h"
 #include "worker/pass/noise_probe.h"
+#include "worker/pass/pixel_order.h"
 #include "worker/pass/primary.h"
 
 namespace baton {
@@ -22,6 +23,7 @@ struct TileRound {
   Round round{};
   const FrameLight& light;
   const TileSurfaces& surfaces;  ///< what its sites see
+  const PixelOrder& order;       ///< in which its slots are worked on
   /// The light that probes are sampled again with; null: there are none.
   const FrameLight* probe_light = nullptr;
   /// What the previous frame left, in the first round where surfaces move: the state is all zero.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/base/patiently.h"
 #include "common/image/film_tile.h"
 #include "common/job/motion.h"
 #include "common/job/plan/sequence.h"
@@ -22,8 +23,27 @@ std::string blob_name(const BlobRef& ref) {
                      ref.tile, ref.digest.hex());
 }
 
+/// The store as a task uses it: what it reads and puts is waited for.
+class PatientStore {
+ public:
+  PatientStore(BlobStore& store, const std::stop_token& stop) : store_(store), stop_(stop) {}
+
+  Result<Bytes> get(const Digest& digest) const {
+    return patiently([&] { return store_.get(digest); }, stop_);
+  }
+  Result<BlobRef> put(BlobKind kind, Step step, std::int32_t tile, const Bytes& bytes) const {
+    BATON_ASSIGN(const Digest digest, patiently([&] { return store_.put(bytes); }, stop_));
+    return BlobRef{kind, step.value(), tile, digest, bytes.size()};
+  }
+  const std::stop_token& stop() const { return stop_; }
+
+ private:
+  BlobStore& store_;
+  const std::stop_token& stop_;
+};
+
 /// A film of the job's step, as one pass made it.
-Result<FilmTile> read_film(const LoadedJob& loaded, const BlobStore& store, const BlobRef& ref,
+Result<FilmTile> read_film(const LoadedJob& loaded, const PatientStore& store, const BlobRef& ref,
                            FilmPass pass) {
   if (ref.kind != BlobKind::film)
     return Error{ErrorKind::bad_input, fmt::format("{}: expected a film", blob_name(ref))};
@@ -39,7 +59,7 @@ Result<FilmTile> read_film(const LoadedJob& loaded, const BlobStore& store, cons
 
 /// The states that a render task starts from, in the order of its inputs. not_held: held ones that
 /// are not here.
-Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobStore& store,
+Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const PatientStore& store,
                                           const std::vector<BlobRef>& inputs,
                                           std::vector<BlobRef>& not_held) {
   std::vector<StatePtr> states;
@@ -67,8 +87,8 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
 }
 
 /// The task's state after `step` from those of another tiling.
-Result<TaskResult> execute_cut(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                               Step step, const std::vector<BlobRef>& inputs) {
+Result<TaskResult> execute_cut(const LoadedJob& loaded, const PatientStore& store,
+                               const TaskKey& task, Step step, const std::vector<BlobRef>& inputs) {
   TaskResult output;
   const CpuTimer timer(output.made.stats.seconds_state);
   const PixelRect rect = TileGrid(loaded.job.image).rect(task.tile);
@@ -85,33 +105,31 @@ Result<TaskResult> execute_cut(const LoadedJob& loaded, BlobStore& store, const 
     parts.push_back(other.get());
   }
   BATON_ASSIGN(const SampleState state, join_states(parts, rect, task.tile));
-  const Bytes bytes = encode_state(state);
-  BATON_ASSIGN(const Digest digest, store.put(bytes));
-  output.made.outputs.push_back(
-      {BlobKind::state, state.step.value(), task.tile, digest, bytes.size()});
+  BATON_ASSIGN(const BlobRef put,
+               store.put(BlobKind::state, state.step, task.tile, encode_state(state)));
+  output.made.outputs.push_back(put);
   return output;
 }
 
 /// Keeps what a render task hands on: in this process if it may stay here, else in the store.
-Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, SampleState&& state,
-                  std::vector<BlobRef>& outputs) {
-  BlobRef ref{BlobKind::state, state.step.value(), state.tile,
-              held_state_name(loaded.digest, state.step, state.tile)};
+Status keep_state(const LoadedJob& loaded, const PatientStore& store, bool may_hold,
+                  SampleState&& state, std::vector<BlobRef>& outputs) {
+  const BlobRef held{BlobKind::state, state.step.value(), state.tile,
+                     held_state_name(loaded.digest, state.step, state.tile)};
   const auto shared = std::make_shared<const SampleState>(std::move(state));
-  if (may_hold && loaded.states->hold(ref, shared)) {
-    outputs.push_back(ref);
+  if (may_hold && loaded.states->hold(held, shared)) {
+    outputs.push_back(held);
     return {};
   }
-  const Bytes bytes = encode_state(*shared);
-  BATON_ASSIGN(ref.digest, store.put(bytes));
-  ref.size_bytes = bytes.size();
-  outputs.push_back(ref);
-  if (moves(loaded.job)) loaded.states->keep(ref.digest, shared);
+  BATON_ASSIGN(const BlobRef put,
+               store.put(BlobKind::state, shared->step, shared->tile, encode_state(*shared)));
+  outputs.push_back(put);
+  if (moves(loaded.job)) loaded.states->keep(put.digest, shared);
   return {};
 }
 
-Result<TaskResult> execute_render(const LoadedJob& loaded, BlobStore& store, const Grant& grant,
-                                  const std::stop_token& stop, std::vector<BlobRef>* left) {
+Result<TaskResult> execute_render(const LoadedJob& loaded, const PatientStore& store,
+                                  const Grant& grant, std::vector<BlobRef>* left) {
   const TaskKey& task = grant.lease.task;
   const StepSpan& steps = grant.steps;
   // Check what came over the wire against the job.
@@ -134,8 +152,8 @@ Result<TaskResult> execute_render(const LoadedJob& loaded, BlobStore& store, con
 
   // Render.
   const auto keep = [&](BlobKind kind, Step step, const Bytes& bytes) -> Status {
-    BATON_ASSIGN(const Digest digest, store.put(bytes));
-    output.made.outputs.push_back({kind, step.value(), task.tile, digest, bytes.size()});
+    BATON_ASSIGN(const BlobRef put, store.put(kind, step, task.tile, bytes));
+    output.made.outputs.push_back(put);
     return {};
   };
   const TileRunSink sink{
@@ -160,7 +178,7 @@ Result<TaskResult> execute_render(const LoadedJob& loaded, BlobStore& store, con
                      fmt::format("the task lacks the film of step {} tile {}", step, task.tile)};
       }};
   const TileRun run{task.tile, task.run(), steps};
-  Result<RenderStats> stats = run_tile(*loaded.context, run, previous, sink, stop);
+  Result<RenderStats> stats = run_tile(*loaded.context, run, previous, sink, store.stop());
   if (!stats) {
     if (left != nullptr) *left = std::move(output.made.outputs);
     return stats.error();
@@ -174,7 +192,7 @@ Result<TaskResult> execute_render(const LoadedJob& loaded, BlobStore& store, con
 
 /// Inputs: the first-pass samples of the tiles within reach in tile order, the tile's own film
 /// among them.
-Result<TaskResult> execute_second_pass(const LoadedJob& loaded, BlobStore& store,
+Result<TaskResult> execute_second_pass(const LoadedJob& loaded, const PatientStore& store,
                                        const TaskKey& task, const std::vector<BlobRef>& inputs) {
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
   if (!loaded.job.visibility.correlated || task.step() < Step(0) ||
@@ -200,16 +218,22 @@ Result<TaskResult> execute_second_pass(const LoadedJob& loaded, BlobStore& store
 
   BATON_ASSIGN(const SecondPassOutput second,
                run_second_pass(*loaded.context, task.step(), task.tile, film, near));
-  const Bytes bytes =
-      encode_film_tile(second.film, {loaded.picture, task.step(), FilmPass::second});
-  BATON_ASSIGN(const Digest digest, store.put(bytes));
-  return TaskResult{
-      {{{BlobKind::film, task.position, task.tile, digest, bytes.size()}}, second.stats}};
+  BATON_ASSIGN(
+      const BlobRef put,
+      store.put(BlobKind::film, task.step(), task.tile,
+                encode_film_tile(second.film, {loaded.picture, task.step(), FilmPass::second})));
+  return TaskResult{{{put}, second.stats}};
 }
 
-Result<TaskResult> execute_assemble(const LoadedJob& loaded, const BlobStore& store,
-                                    const TaskKey& task, const std::vector<BlobRef>& inputs,
-                                    const std::stop_token& stop) {
+/// The plate of a frame, which must still be the job's.
+Result<Plate> read_plate(const LoadedJob& loaded, FrameNumber number) {
+  BATON_ASSIGN(Plate plate, load_plate(loaded.context->job, number));
+  BATON_TRY(verify_asset(loaded.assets, file_at(*loaded.context->job.output.plate, number)));
+  return plate;
+}
+
+Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore& store,
+                                    const TaskKey& task, const std::vector<BlobRef>& inputs) {
   const TileGrid grid(loaded.job.image);
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
   const FrameIndex frame = task.frame();
@@ -225,7 +249,8 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const BlobStore& st
   FilmTile image;
   std::vector<bool> pasted(inputs.size(), false);
   for (const BlobRef& input : inputs) {
-    if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped while assembling"};
+    if (store.stop().stop_requested())
+      return Error{ErrorKind::cancelled, "stopped while assembling"};
     const FilmPass pass = loaded.job.visibility.correlated ? FilmPass::second : FilmPass::first;
     BATON_ASSIGN(const FilmTile film, read_film(loaded, store, input, pass));
     const bool fits = input.kind == BlobKind::film && input.step() == step && input.tile >= 0 &&
@@ -244,14 +269,14 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const BlobStore& st
   std::vector<std::string> notes;
   if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
     const FrameNumber number = here.frames[frame.index()];
-    BATON_ASSIGN(Plate plate, load_plate(here, number));
-    BATON_TRY(verify_asset(loaded.assets, file_at(*here.output.plate, number)));
+    BATON_ASSIGN(Plate plate, patiently([&] { return read_plate(loaded, number); }, store.stop()));
     notes = plate_notes(file_at(*here.output.plate, number), plate);
     plate_image = std::move(plate.picture);
   }
   BATON_ASSIGN(const WrittenFrame written,
-               write_frame(loaded.job, loaded.digest, frame, std::move(image), plate_image,
-                           [&] { return expect_output_folder(loaded); }));
+               write_frame(
+                   loaded.job, loaded.digest, frame, std::move(image), plate_image,
+                   [&] { return expect_output_folder(loaded); }, store.stop()));
   return TaskResult{.made = {.outputs = {written.file},
                              .frames = {{frame.value(), task.tile, {}, written.quality}}},
                     .notes = std::move(notes)};
@@ -262,24 +287,27 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const BlobStore& st
 Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const Grant& grant,
                                 const std::stop_token& stop, std::vector<BlobRef>* left) {
   const TaskKey& task = grant.lease.task;
+  const PatientStore patient(store, stop);
   loaded.states->release_before(grant.states_from);
   switch (task.kind) {
     case TaskKind::render:
-      return execute_render(loaded, store, grant, stop, left);
+      return execute_render(loaded, patient, grant, left);
     case TaskKind::second_pass:
-      return execute_second_pass(loaded, store, task, grant.inputs);
+      return execute_second_pass(loaded, patient, task, grant.inputs);
     case TaskKind::assemble:
-      return execute_assemble(loaded, store, task, grant.inputs, stop);
+      return execute_assemble(loaded, patient, task, grant.inputs);
   }
   return Error{ErrorKind::bad_input, "unknown kind of task"};
 }
 
 Result<std::vector<PublishedState>> publish_held(const JobStates::List& states, BlobStore& store) {
   std::vector<PublishedState> published;
+  const std::stop_token never;
+  const PatientStore patient(store, never);
   for (const auto& [ref, state] : states) {
-    const Bytes bytes = encode_state(*state);
-    BATON_ASSIGN(const Digest digest, store.put(bytes));
-    published.push_back({ref, {ref.kind, ref.position, ref.tile, digest, bytes.size()}});
+    BATON_ASSIGN(const BlobRef put,
+                 patient.put(ref.kind, ref.step(), ref.tile, encode_state(*state)));
+    published.push_back({ref, put});
   }
   return published;
 }

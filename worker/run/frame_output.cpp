@@ -7,6 +7,7 @@
 #include <set>
 
 #include "common/base/files.h"
+#include "common/base/patiently.h"
 #include "common/base/version.h"
 #include "common/image/cryptomatte.h"
 #include "common/image/noise.h"
@@ -192,7 +193,8 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
 
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
                                  FilmTile image, const std::optional<RgbImage>& plate,
-                                 const std::function<Status()>& may_appear) {
+                                 const std::function<Status()>& may_appear,
+                                 const std::stop_token& stop) {
   FrameQuality quality = judge_frame(image);
   if (job.output.clamp_negative) clamp_negative(image);
   if (plate) {
@@ -228,7 +230,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
     const Status verified = verify_frame(temporary, image, frame.value());
     return verified && may_appear ? may_appear() : verified;
   };
-  BATON_TRY(write_file_verified(path, bytes, check));
+  BATON_TRY(patiently([&] { return write_file_verified(path, bytes, check); }, stop));
   return WrittenFrame{{BlobKind::image, frame.value(), 0, digest_of(bytes), bytes.size()}, quality};
 }
 

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -39,10 +40,12 @@ struct WrittenFrame {
 /// Before the file gets its name it is read back from disk: every byte must be the encoder's, the
 /// header and the table of blocks must be whole, and one block of rows, another one in each frame,
 /// must unpack to the film. may_appear is asked last: a job may have made way for another while the
-/// frame was written. Errors: the disk, a file that is not what was written, that of may_appear.
+/// frame was written. A disk that is away for a moment is waited for, until `stop` is requested.
+/// Errors: the disk, a file that is not what was written, that of may_appear.
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
                                  FilmTile image, const std::optional<RgbImage>& plate = {},
-                                 const std::function<Status()>& may_appear = {});
+                                 const std::function<Status()>& may_appear = {},
+                                 const std::stop_token& stop = {});
 
 /// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
 /// `block` (0-based, modulo the number of blocks) its values. ErrorKind::corrupt names channel and

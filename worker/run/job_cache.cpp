@@ -7,7 +7,9 @@
 
 #include "common/base/file_stamp.h"
 #include "common/base/limits.h"
+#include "common/base/patiently.h"
 #include "common/job/plan/estimate.h"
+#include "common/job/plan/sequence.h"
 #include "common/job/text/job_json.h"
 #include "common/scene/material/detail_loader.h"
 #include "common/store/folder_token.h"
@@ -19,7 +21,7 @@ namespace {
 /// What the tiles in work and a frame that is assembled take, about.
 std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
   const JobEstimate e = estimate_job(job);
-  const std::int64_t side = job.image.tile_size;
+  const std::int64_t side = TileGrid(job.image).tile_size();
   const std::int64_t pixels = std::min(job.image.rendered().area(), side * side);
   const bool any_detail = std::ranges::any_of(
       job.scene.materials, [](const auto& material) { return has_detail(material.second); });
@@ -36,12 +38,13 @@ std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
                                     plate_bytes);
 }
 
-/// How files stand; nullopt: one is not there, or cannot be looked at now.
-std::vector<std::optional<FileStamp>> stamps_of(const std::vector<AssetDigest>& files) {
+/// How files stand; nullopt: one is not there. Errors: one cannot be looked at, or is none.
+Result<std::vector<std::optional<FileStamp>>> stamps_of(const std::vector<AssetDigest>& files) {
   std::vector<std::optional<FileStamp>> stamps;
   for (const AssetDigest& file : files) {
-    const Result<std::optional<FileStamp>> stamp = stamp_of(file.path);
-    stamps.push_back(stamp ? *stamp : std::nullopt);
+    BATON_ASSIGN(const std::optional<FileStamp> stamp,
+                 patiently([&] { return stamp_of(file.path); }));
+    stamps.push_back(stamp);
   }
   return stamps;
 }
@@ -71,13 +74,11 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
   const ParsedJobDocument here{map_paths(parsed.job, machine.maps),
                                map_paths(parsed.assets, machine.maps), parsed.digest,
                                parsed.picture};
-  auto loaded = std::make_shared<LoadedJob>(
-      LoadedJob{.job = parsed.job,
-                .digest = document.job,
-                .picture = parsed.picture,
-                .context = nullptr,
-                .states = std::make_shared<JobStates>(machine.memory.states),
-                .token = document.token});
+  auto loaded = std::make_shared<LoadedJob>(LoadedJob{.job = parsed.job,
+                                                      .digest = document.job,
+                                                      .picture = parsed.picture,
+                                                      .context = nullptr,
+                                                      .token = document.token});
   loaded->job.output.directory = here.job.output.directory;
   BATON_TRY(check_roots(here, machine.roots));
   if (const Status seen = expect_output_folder(*loaded); !seen) {
@@ -86,21 +87,19 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
   }
 
   // What changes while it is read is looked at again, and then told of.
-  const std::vector<std::optional<FileStamp>> before = stamps_of(here.assets);
+  BATON_ASSIGN(const auto before, stamps_of(here.assets));
   BATON_TRY(verify_assets(here.assets));
+  for (std::size_t i = 0; i < before.size(); ++i)
+    loaded->assets.push_back({here.assets[i], before[i].value_or(FileStamp())});
   BATON_ASSIGN(const std::uint64_t room, room_for_scene(here.job, machine));
-  auto loading = shelf.get(here.job, here.assets, machine.memory, room);
-  // Readers take an error of the moment for a broken file.
-  if (!loading && loading.error().kind == ErrorKind::bad_input)
-    loading = shelf.get(here.job, here.assets, machine.memory, room);
-  BATON_ASSIGN(const auto assets, std::move(loading));
-  if (stamps_of(here.assets) != before)
+  BATON_ASSIGN(const auto assets, shelf.get(here.job, loaded->assets, machine.memory, room));
+  BATON_ASSIGN(const auto after, stamps_of(here.assets));
+  if (after != before)
     return Error{ErrorKind::io,
                  "the files of job '" + here.job.name + "' change while they are read"};
   BATON_ASSIGN(loaded->context,
                make_render_context(here.job, parsed.picture, assets, machine.memory));
   loaded->scene_bytes = assets->size_bytes();
-  loaded->assets = here.assets;
   return LoadedJobPtr(std::move(loaded));
 }
 
@@ -131,11 +130,6 @@ LoadedJobPtr JobEntry::loaded() const {
   return result_ && result_->ok() ? result_->value() : nullptr;
 }
 
-std::shared_ptr<JobStates> JobEntry::states() const {
-  const LoadedJobPtr job = loaded();
-  return job != nullptr ? job->states : states_;
-}
-
 Result<LoadedJobPtr> JobEntry::load(const std::stop_token& stop) {
   // Wait until there is something to do or to return.
   std::unique_lock lock(mutex_);
@@ -157,7 +151,7 @@ Result<LoadedJobPtr> JobEntry::load(const std::stop_token& stop) {
     if (!stop.stop_requested()) result = loader_(*document_);
     lock.lock();
   }
-  if (result && states_ != nullptr) {
+  if (result) {
     LoadedJob job = **result;
     job.states = states_;
     result = LoadedJobPtr(std::make_shared<const LoadedJob>(std::move(job)));
@@ -181,32 +175,22 @@ std::vector<LoadedJobPtr> JobCache::loaded() const {
   return jobs;
 }
 
-std::vector<std::pair<Digest, std::shared_ptr<JobStates>>> JobCache::states() const {
-  std::vector<std::pair<Digest, std::shared_ptr<JobStates>>> all(aside_.begin(), aside_.end());
-  for (const std::shared_ptr<JobEntry>& entry : entries_) {
-    if (auto states = entry->states()) all.emplace_back(entry->digest(), std::move(states));
-  }
-  return all;
+bool JobCache::has_entry(const Digest& digest) const {
+  return std::ranges::any_of(entries_,
+                             [&](const auto& entry) { return entry->digest() == digest; });
 }
 
-/// What the job holds outlives its scene: nobody else has it.
-void JobCache::set_aside(const JobEntry& entry) {
-  std::shared_ptr<JobStates> states = entry.states();
-  if (states == nullptr || states->held().empty()) return;
-  states->drop_kept();
-  aside_.emplace_front(entry.digest(), std::move(states));
-  if (aside_.size() > limits::kMaxCachedJobs) aside_.pop_back();
-}
-
-std::shared_ptr<JobStates> JobCache::take_from_aside(const Digest& digest) {
-  const auto found = std::ranges::find(aside_, digest, &decltype(aside_)::value_type::first);
-  if (found == aside_.end()) return nullptr;
-  std::shared_ptr<JobStates> states = std::move(found->second);
-  aside_.erase(found);
-  return states;
+/// Where one job lacks it, what those without a scene hold makes room.
+void JobCache::make_room_for_states() {
+  bool is_lacking = false;
+  for (const auto& [job, states] : states_) is_lacking |= states->take_lack_of_room();
+  if (!is_lacking) return;
+  std::erase_if(states_, [&](const auto& of_job) { return !has_entry(of_job.first); });
 }
 
 std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
+  make_room_for_states();
+
   // Move the job to the front.
   const auto found = std::find_if(entries_.begin(), entries_.end(),
                                   [&](const auto& entry) { return entry->digest() == digest; });
@@ -215,22 +199,22 @@ std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
       entries_.splice(entries_.begin(), entries_, found);
       return entries_.front();
     }
-    set_aside(**found);
     entries_.erase(found);
   }
-
-  std::shared_ptr<JobStates> states = take_from_aside(digest);
 
   // Make room. A job that tasks still use stays: a document that arrives for it must find it.
   for (auto oldest = entries_.end(); oldest != entries_.begin() && !has_room_for_another();) {
     --oldest;
     if (oldest->use_count() > 1) continue;
-    set_aside(**oldest);
     oldest = entries_.erase(oldest);
   }
-  for (const LoadedJobPtr& job : loaded()) job->states->drop_kept();
-  entries_.push_front(
-      std::make_shared<JobEntry>(digest, loader_, file_patience_, std::move(states)));
+  for (const auto& [job, states] : states_) states->drop_kept();
+  std::erase_if(states_, [&](const auto& of_job) {
+    return !has_entry(of_job.first) && !of_job.second->holds_any();
+  });
+  std::shared_ptr<JobStates>& states = states_[digest];
+  if (states == nullptr) states = std::make_shared<JobStates>(state_memory_);
+  entries_.push_front(std::make_shared<JobEntry>(digest, loader_, states, file_patience_));
   return entries_.front();
 }
 

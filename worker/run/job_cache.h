@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <list>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -30,14 +31,14 @@ struct LoadedJob {
   JobSpec job;
   Digest digest, picture;
   std::shared_ptr<const RenderContext> context;
-  /// In a share of the process's memory; with none nothing is kept.
+  /// Those of the process; with no memory nothing is kept.
   std::shared_ptr<JobStates> states = std::make_shared<JobStates>(std::make_shared<MemoryShare>(0));
   std::uint64_t scene_bytes = 0;
   /// What this machine does not see of the job, a line; then nothing of it is loaded.
   std::string unseen = {};
   std::string token = {};  ///< JobDocument::token
   /// Files that the job reads, where this machine has them.
-  std::vector<AssetDigest> assets = {};
+  std::vector<KnownAsset> assets = {};
 };
 
 using LoadedJobPtr = std::shared_ptr<const LoadedJob>;
@@ -69,14 +70,13 @@ inline constexpr std::chrono::milliseconds kFilePatience{5000};
 /// others wait.
 class JobEntry {
  public:
-  /// states: that the process has of the job already; null: none.
-  JobEntry(const Digest& digest, JobLoader loader,
-           std::chrono::milliseconds file_patience = kFilePatience,
-           std::shared_ptr<JobStates> states = nullptr)
+  /// states: that the process has of the job; not null.
+  JobEntry(const Digest& digest, JobLoader loader, std::shared_ptr<JobStates> states,
+           std::chrono::milliseconds file_patience = kFilePatience)
       : digest_(digest),
         loader_(std::move(loader)),
-        file_patience_(file_patience),
-        states_(std::move(states)) {}
+        states_(std::move(states)),
+        file_patience_(file_patience) {}
 
   const Digest& digest() const { return digest_; }
   /// Hands over the document; a second one is ignored.
@@ -86,17 +86,15 @@ class JobEntry {
   bool failed() const;
   /// Null unless it is loaded.
   LoadedJobPtr loaded() const;
-  /// Those of the job; null: there are none.
-  std::shared_ptr<JobStates> states() const;
   /// Waits for the document, then loads once for all callers; once more after a while if a file
-  /// could not be read. Cancelled when `stop` is requested while waiting.
+  /// could not be read (ErrorKind::io). Cancelled when `stop` is requested while waiting.
   Result<LoadedJobPtr> load(const std::stop_token& stop);
 
  private:
   const Digest digest_;
   const JobLoader loader_;
-  const std::chrono::milliseconds file_patience_;
   const std::shared_ptr<JobStates> states_;
+  const std::chrono::milliseconds file_patience_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::optional<JobDocument> document_;
@@ -108,10 +106,13 @@ class JobEntry {
 /// the control thread alone; the entries it hands out are safe to share.
 class JobCache {
  public:
-  /// max_idle_scene_bytes: scenes of jobs that nobody uses go when they take more.
-  explicit JobCache(JobLoader loader, std::chrono::milliseconds file_patience = kFilePatience,
-                    std::uint64_t max_idle_scene_bytes = std::numeric_limits<std::uint64_t>::max())
+  /// states: the memory of the states of all jobs. max_idle_scene_bytes: scenes of jobs that nobody
+  /// uses go when they take more.
+  JobCache(JobLoader loader, MemorySharePtr states,
+           std::chrono::milliseconds file_patience = kFilePatience,
+           std::uint64_t max_idle_scene_bytes = std::numeric_limits<std::uint64_t>::max())
       : loader_(std::move(loader)),
+        state_memory_(std::move(states)),
         file_patience_(file_patience),
         max_idle_scene_bytes_(max_idle_scene_bytes) {}
 
@@ -120,22 +121,23 @@ class JobCache {
   std::shared_ptr<JobEntry> entry(const Digest& digest);
   /// Those that are loaded, most recent first.
   std::vector<LoadedJobPtr> loaded() const;
-  /// The states of jobs that are loaded, and what others hold.
-  std::vector<std::pair<Digest, std::shared_ptr<JobStates>>> states() const;
+  /// The states of all jobs that have an entry, and what others hold.
+  const std::map<Digest, std::shared_ptr<JobStates>>& states() const { return states_; }
 
  private:
   bool has_room_for_another() const;
-  void set_aside(const JobEntry& entry);
-  std::shared_ptr<JobStates> take_from_aside(const Digest& digest);
+  bool has_entry(const Digest& digest) const;
+  void make_room_for_states();
 
   JobLoader loader_;
+  MemorySharePtr state_memory_;
   std::chrono::milliseconds file_patience_;
   std::uint64_t max_idle_scene_bytes_;
   /// At most limits::kMaxCachedJobs, and beyond that those in use.
   std::list<std::shared_ptr<JobEntry>> entries_;
-  /// What jobs hold that had to make room, latest first, at most limits::kMaxCachedJobs: nobody
-  /// says which of them have ended. A job whose states go all the same has them made again.
-  std::list<std::pair<Digest, std::shared_ptr<JobStates>>> aside_;
+  /// What a job holds outlives its scene: nobody else has it. As nobody says which jobs have ended,
+  /// it goes when one at work lacks room; a job that has not ended has it made again.
+  std::map<Digest, std::shared_ptr<JobStates>> states_;
 };
 
 }  // namespace baton

@@ -12,7 +12,9 @@ BlobRef ref_of(const Digest& name, const SampleState& state) {
 bool JobStates::hold(const BlobRef& ref, const StatePtr& state) {
   if (held_.keep(ref.digest, ref.step(), state)) return true;
   kept_.clear();
-  return held_.keep(ref.digest, ref.step(), state);
+  if (held_.keep(ref.digest, ref.step(), state)) return true;
+  lacks_room_ = true;
+  return false;
 }
 
 JobStates::StatePtr JobStates::find(const BlobRef& ref) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,8 @@ class JobStates {
 
   /// False: there is no room, and it is not held.
   bool hold(const BlobRef& ref, const StatePtr& state);
+  /// Whether a state found no room since the last call.
+  bool take_lack_of_room() { return lacks_room_.exchange(false); }
   /// Keeps a state of the store, if there is room.
   void keep(const Digest& digest, const StatePtr& state) { kept_.keep(digest, state->step, state); }
   /// Null: it is not here.
@@ -31,6 +34,7 @@ class JobStates {
   /// Those of the held states that are named; all, in the order of their names.
   List held(const std::vector<Digest>& names) const;
   List held() const;
+  bool holds_any() const { return !held_.empty(); }
 
   /// Forgets the states of steps before this one: no task needs them.
   void release_before(Step step) {
@@ -44,6 +48,7 @@ class JobStates {
 
  private:
   StepKeep<Digest, SampleState> held_, kept_;
+  std::atomic<bool> lacks_room_ = false;
 };
 
 }  // namespace baton

@@ -106,22 +106,6 @@ class NoteLog {
 /// included.
 constexpr std::chrono::minutes kLoadPatience{15};
 
-/// A disk may be away for a moment, and a blob that another machine has written be seen here later:
-/// the task is begun again for a second and a half.
-Result<TaskResult> execute_patiently(const LoadedJob& loaded, const QueuedTask& task,
-                                     const std::stop_token& stop, std::vector<BlobRef>& left) {
-  constexpr int kAttempts = 6;
-  std::chrono::milliseconds pause{50};
-  for (int attempt = 1;; ++attempt, pause *= 2) {
-    left.clear();
-    Result<TaskResult> result = execute_task(loaded, *task.store, task.grant, stop, &left);
-    const bool may_pass = !result && result.error().kind == ErrorKind::io;
-    if (!may_pass || attempt == kAttempts || stop.stop_requested()) return result;
-    if (attempt == 1) spdlog::warn("waits for {}", result.error().message);
-    std::this_thread::sleep_for(pause);
-  }
-}
-
 /// Executes a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
 Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token& stop,
@@ -150,7 +134,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
       notes.report(loaded->digest, {seen.error().message});
       return TaskResult{.made = {}, .unseen = seen.error().message};
     }
-    Result<TaskResult> frame = execute_patiently(*loaded, task, stop, left);
+    Result<TaskResult> frame = execute_task(*loaded, *task.store, task.grant, stop, &left);
     if (const Status seen = expect_output_folder(*loaded); !frame && !seen)
       return TaskResult{.made = {}, .unseen = seen.error().message};
     if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
@@ -166,7 +150,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
     command = replay_command(path, numbers[last.index()], key.tile);
   }
   const CrashNote note(command);
-  Result<TaskResult> output = execute_patiently(*loaded, task, stop, left);
+  Result<TaskResult> output = execute_task(*loaded, *task.store, task.grant, stop, &left);
   if (output) output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
@@ -221,7 +205,7 @@ class Worker {
             [this](const JobDocument& document) {
               return load_job_document(document, machine_, shelf_);
             },
-            kFilePatience, machine_.memory.scene_bytes / 2),
+            machine_.memory.states, kFilePatience, machine_.memory.scene_bytes / 2),
         threads_(
             options.num_threads,
             [this](const QueuedTask& task, const std::stop_token& stop,

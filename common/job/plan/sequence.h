@@ -55,12 +55,13 @@ struct FrameSpec {
 /// One FrameSpec per step of the job, in order.
 std::vector<FrameSpec> expand_sequence(const JobSpec& job);
 
-/// The rendered pixels cut into square tiles, row by row; border tiles are clipped. Tiles begin at
-/// multiples of kAlign pixels of the picture, wherever what is rendered of it begins, so that they
-/// consist of whole blocks of the picture.
+/// The rendered pixels cut into square tiles, row by row; border tiles are clipped. The first tile
+/// begins at a multiple of kAlign pixels of the picture, wherever what is rendered of it begins,
+/// and their side is a multiple of a block's: all consist of whole blocks of the picture.
 class TileGrid {
  public:
   static constexpr std::int32_t kAlign = limits::kAdaptiveBlock;
+  static_assert(kAlign % PixelBlocks::kSide == 0);
 
   /// tile_size: > 0, rounded up to a multiple of PixelBlocks::kSide.
   TileGrid(const PixelRect& image, int tile_size);

@@ -152,7 +152,7 @@ StoreEstimate bound_store(const JobSpec& job) {
 }
 
 std::int64_t estimate_blob_bytes(const JobSpec& job, BlobKind kind) {
-  const std::int64_t side = job.image.tile_size;
+  const std::int64_t side = TileGrid(job.image).tile_size();
   const PixelRect image = job.image.rendered();
   const auto pixels = static_cast<double>(std::min<std::int64_t>(side, image.width()) *
                                           std::min<std::int64_t>(side, image.height()));

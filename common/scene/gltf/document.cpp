@@ -59,9 +59,10 @@ void check_version(const JsonView& root) {
 
 Bytes copy_of(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
 
-/// What a buffer holds, at least as many bytes as it says.
+/// What a buffer holds, at least as many bytes as it says. unread: its file, where that cannot be
+/// read.
 void load_buffer(const JsonView& buffer, const std::optional<ByteView>& binary,
-                 Document& document) {
+                 std::optional<ErrorKind>& unread, Document& document) {
   // In place of what views decompress there may be nothing.
   const bool is_fallback =
       buffer.at("extensions").at("EXT_meshopt_compression").boolean("fallback");
@@ -73,8 +74,13 @@ void load_buffer(const JsonView& buffer, const std::optional<ByteView>& binary,
     if (resource->bytes) {
       bytes = std::move(*resource->bytes);
     } else {
-      Result<Bytes> file = read_file(resource->file, limits::kMaxAssetFileBytes);
-      if (!file) return buffer.fail("its file: " + file.error().message);
+      const Status there = expect_file(resource->file);
+      Result<Bytes> file =
+          there ? read_file(resource->file, limits::kMaxAssetFileBytes) : there.error();
+      if (!file) {
+        unread = file.error().kind;
+        return buffer.fail("its file: " + file.error().message);
+      }
       bytes = std::move(*file);
       document.buffer_files.push_back(resource->file);
     }
@@ -192,6 +198,7 @@ Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std
   if (!json.is_object())
     return Error{ErrorKind::bad_input, path + ": not a glTF file: expected an object"};
   Fault fault;
+  std::optional<ErrorKind> unread;
   const JsonView root(&json, "$", fault);
   auto document = std::make_shared<Document>();
   document->path = path;
@@ -200,7 +207,7 @@ Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std
   const auto good = [&] { return !fault.has_value(); };
   if (good())
     root.each("buffers", [&](const JsonView& buffer) {
-      if (good()) load_buffer(buffer, container.binary, *document);
+      if (good()) load_buffer(buffer, container.binary, unread, *document);
     });
   // Views come before images, which come before textures.
   if (good()) parse_views(root, *document);
@@ -208,7 +215,7 @@ Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std
   if (good()) root.each("images", [&](const JsonView& image) { load_image(image, *document); });
   if (good()) parse_lists(root, *document);
   if (good()) resolve_meshes(root, *document);
-  if (fault) return document->error(*fault);
+  if (fault) return Error{unread.value_or(ErrorKind::bad_input), document->error(*fault).message};
   return std::shared_ptr<const Document>(std::move(document));
 }
 

@@ -43,6 +43,7 @@ Neighbours wrapped(float x, int count) {
 }  // namespace
 
 Result<std::shared_ptr<const MeasuredBrdf>> MeasuredBrdf::load(const std::string& path) {
+  BATON_TRY(expect_file(path));
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
   const auto fail = [&](const std::string& what) {
     return Error{ErrorKind::bad_input, fmt::format("{}: not a MERL table: {}", path, what)};

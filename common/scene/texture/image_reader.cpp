@@ -108,11 +108,19 @@ std::string name_by_content(ByteView bytes) {
 
 using FirstBytes = std::array<std::byte, 4>;
 
-FirstBytes first_bytes(const std::string& path) {
+Result<FirstBytes> first_bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   FirstBytes start{};
   file.read(reinterpret_cast<char*>(start.data()), start.size());
+  if (file.bad() || !file.is_open()) return Error{ErrorKind::io, path + ": cannot read"};
   return start;
+}
+
+/// OpenImageIO opens the file itself, and takes an error of the moment for a broken one: what it
+/// does not read it looks at again.
+Result<Image> read_by_name(const std::string& path) {
+  Result<Image> image = read(path, std::nullopt, path);
+  return image ? std::move(image) : read(path, std::nullopt, path);
 }
 
 bool is_exr(const FirstBytes& start) {
@@ -147,11 +155,11 @@ Result<Image> read_exr_texture(const std::string& path) {
 Result<Image> read_image(const std::string& path) {
   BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
   if (!stamp) return bad_image(path, "missing: expected an image file");
-  const FirstBytes start = first_bytes(path);
+  BATON_ASSIGN(const FirstBytes start, first_bytes(path));
   if (is_exr(start)) return read_exr_texture(path);
-  if (!is_jpeg(start)) return read(path, std::nullopt, path);
+  if (!is_jpeg(start)) return read_by_name(path);
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
-  return with_notes(read(path, std::nullopt, path), bytes);
+  return with_notes(read_by_name(path), bytes);
 }
 
 Result<Image> read_image(ByteView bytes, const std::string& name) {

@@ -100,6 +100,8 @@ TEST(StoreEstimate, ABlobIsThatOfATile) {
   JobSpec job = job_of(Method::sequential, 12);
   EXPECT_EQ(estimate_blob_bytes(job, BlobKind::state), 64 * 64 * 153);
   EXPECT_EQ(estimate_blob_bytes(job, BlobKind::image), 0);
+  job.image.tile_size = 61;
+  EXPECT_EQ(estimate_blob_bytes(job, BlobKind::state), 64 * 64 * 153) << "tiles are whole blocks";
   job.image.tile_size = 1024;
   EXPECT_EQ(estimate_blob_bytes(job, BlobKind::state), 640 * 360 * 153);
 }

@@ -26,6 +26,18 @@ TEST(PixelOrder, GoesRowByRowWithoutBlocks) {
   EXPECT_EQ(PixelOrder({0, 0, 1, 1}, RoundPixels(), false, 64).num_batches(), 0u);
 }
 
+// What is appended stays together, in batches as full as that allows.
+TEST(PixelOrder, GrowsByWhatStaysTogether) {
+  PixelOrder order(64);
+  for (const std::size_t count : {16, 40, 8, 1, 64, 30, 30}) order.append(count);
+  std::vector<std::size_t> sizes;
+  for (std::size_t i = 0; i < order.num_batches(); ++i) sizes.push_back(order.batch(i).size());
+  EXPECT_THAT(sizes, testing::ElementsAre(64, 1, 64, 60));
+  const std::vector<std::uint32_t> slots = all_slots(order);
+  ASSERT_EQ(slots.size(), 189u);
+  for (std::uint32_t i = 0; i < slots.size(); ++i) ASSERT_EQ(slots[i], i);
+}
+
 // H: each slot comes once, pixels of a block in one batch and ascending, whichever pixels take part
 // and wherever the tile begins (seeds 0 to 199).
 TEST(PixelOrder, KeepsBlocksTogether) {

@@ -7,9 +7,10 @@
 #include <numeric>
 
 #include "common/job/text/frame_range.h"
-#include "common/state/sample_planes.h"
+#include "common/state/memory_plane.h"
 #include "tests/support/alive_box.h"
 #include "tests/support/small_scene.h"
+#include "worker/pass/pixel_order.h"
 
 namespace baton {
 namespace {
@@ -257,6 +258,55 @@ TEST(Reprojection, TolerancesDecideWhatIsTheSameSurface) {
   job.motion.normal_tolerance_deg = 0.1f;
   job.motion.depth_tolerance = 1e-3f;
   EXPECT_EQ(Follower(job).at(16, 12).history, PixelHistory::moved);
+}
+
+// The camera moves by a block. Of a box and the catcher beside it, whose edge goes through the
+// fourth block, each block inherits what the pixels of its kind had in the block to its right.
+TEST(Reprojection, BlocksTakeTheirMemoryAlong) {
+  JobSpec job = pan_job(1, 4);
+  job.motion.max_px = 5;
+  job.scene.ground->catcher = true;
+  job.scene.objects = {
+      {.mesh = "box", .material = "metal", .translate = {1.8f, 0, 0}, .scale = {3.2f, 1e-4f, 4}}};
+  const auto context = *load_render_context(job, Digest{1, 2});
+  const auto before = *context->geometry->at(Step(0)), now = *context->geometry->at(Step(1));
+  const PixelRect rect = context->grid.rect(0);
+  const TileSurfaces surfaces = trace_primary(context->job, *now, rect);
+  auto old = std::make_shared<SampleState>();
+  old->resize(memory_format(true), rect, 0);
+  const TileSurfaces seen = trace_primary(context->job, *before, rect);
+  for (std::size_t i = 0; i < old->num_pixels(); ++i)
+    old->source[i] = seen.sees_catcher(i) ? PixelSource::catcher : PixelSource::carried;
+  const PixelBlocks blocks(rect);
+  for (std::size_t block = 0; block < blocks.count(); ++block) {
+    for (const std::size_t plane : {0, 1}) {
+      const auto number = static_cast<std::uint8_t>(2 * block + 2 + 100 * plane);
+      block_memory_plane(*old, plane)[block].cells[3] = {number, number};
+    }
+  }
+
+  const StatePtr states[] = {old};
+  Reprojection reprojection(*context, *now, *before, states);
+  SampleState state;
+  state.resize(memory_format(true), rect, 0);
+  const RoundPixels pixels = RoundPixels::all(state.num_pixels());
+  const PixelOrder order(rect, pixels, true, 64);
+  for (std::size_t i = 0; i < order.num_batches(); ++i) {
+    reprojection.look_up(surfaces, order.batch(i), context->frames[1]);
+    reprojection.inherit_blocks(surfaces, order.batch(i), state);
+  }
+  EXPECT_FALSE(surfaces.sees_catcher(14));
+  EXPECT_TRUE(surfaces.sees_catcher(13));
+  for (std::size_t block = 0; block < blocks.count(); ++block) {
+    const PixelRect at = blocks.pixels(block);
+    const bool has_source = at.x1 < 32;
+    const std::array<bool, 2> sees{has_source && at.x1 > 14, has_source && at.x0 < 14};
+    for (const std::size_t plane : {0, 1}) {
+      const auto half = static_cast<std::uint8_t>(sees[plane] ? block + 2 + 50 * plane : 0);
+      EXPECT_EQ(block_memory_plane(state, plane)[block].cells[3], (VisibilityCell{half, half}))
+          << block << " plane " << plane;
+    }
+  }
 }
 
 JobSpec stretching_job() {

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <optional>
 #include <thread>
 #include <vector>
 
+#include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/state/sample_planes.h"
 #include "tests/support/small_scene.h"
 
 namespace baton {
@@ -16,13 +19,22 @@ Result<LoadedJobPtr> empty_job(const JobDocument& document) {
   return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{{}, document.job, {}, nullptr}));
 }
 
+std::shared_ptr<JobStates> no_states() {
+  return std::make_shared<JobStates>(std::make_shared<MemoryShare>(0));
+}
+/// Room for the states of all jobs.
+MemorySharePtr room(std::uint64_t bytes = 0) { return std::make_shared<MemoryShare>(bytes); }
+
 TEST(JobCache, ManyWaitersLoadOnce) {
   std::atomic<int> loads{0};
-  JobEntry entry({1, 1}, [&](const JobDocument& document) {
-    EXPECT_EQ(document.json, "text");
-    ++loads;
-    return empty_job(document);
-  });
+  JobEntry entry(
+      {1, 1},
+      [&](const JobDocument& document) {
+        EXPECT_EQ(document.json, "text");
+        ++loads;
+        return empty_job(document);
+      },
+      no_states());
 
   // All threads wait for the document; then all get the same job.
   std::vector<LoadedJobPtr> jobs(8);
@@ -38,7 +50,7 @@ TEST(JobCache, ManyWaitersLoadOnce) {
 }
 
 TEST(JobCache, AWaiterCanBeStopped) {
-  JobEntry entry({1, 1}, empty_job);
+  JobEntry entry({1, 1}, empty_job, no_states());
   std::stop_source stop;
   std::thread stopper([&] { stop.request_stop(); });
   const Result<LoadedJobPtr> job = entry.load(stop.get_token());
@@ -49,10 +61,11 @@ TEST(JobCache, AWaiterCanBeStopped) {
 
 TEST(JobCache, AFailureIsForThatEntryAlone) {
   int loads = 0;
-  JobCache cache([&](const JobDocument& document) -> Result<LoadedJobPtr> {
+  const auto loader = [&](const JobDocument& document) -> Result<LoadedJobPtr> {
     if (++loads == 1) return Error{ErrorKind::bad_input, "mesh.ply: no triangles"};
     return empty_job(document);
-  });
+  };
+  JobCache cache(loader, room());
   const auto first = cache.entry({1, 1});
   first->provide({{}, "text"});
   EXPECT_FALSE(first->load({}));
@@ -75,7 +88,7 @@ TEST(JobCache, AFileThatIsAwayIsLookedForAgain) {
     return empty_job(document);
   };
   const auto load = [&] {
-    JobEntry entry({1, 1}, loader, 5ms);
+    JobEntry entry({1, 1}, loader, no_states(), 5ms);
     entry.provide({{}, "text"});
     loads = 0;
     return entry.load({}).ok();
@@ -91,7 +104,7 @@ TEST(JobCache, AFileThatIsAwayIsLookedForAgain) {
 }
 
 TEST(JobCache, TheOldestJobGoesFirst) {
-  JobCache cache(empty_job);
+  JobCache cache(empty_job, room());
   cache.entry({0, 1})->provide({{}, "text"});
   cache.entry({0, 2})->provide({{}, "text"});
   for (std::uint64_t i = 3; i <= limits::kMaxCachedJobs; ++i) (void)cache.entry({0, i});
@@ -104,7 +117,7 @@ TEST(JobCache, TheOldestJobGoesFirst) {
 // A task waits for its job's document. However many jobs come meanwhile, the document must reach
 // the entry that the task holds, or the task would wait for ever.
 TEST(JobCache, AJobInUseIsNotForgotten) {
-  JobCache cache(empty_job);
+  JobCache cache(empty_job, room());
   std::vector<std::shared_ptr<JobEntry>> held;
   for (std::uint64_t i = 0; i < 3 * limits::kMaxCachedJobs; ++i)
     held.push_back(cache.entry({0, i}));
@@ -120,40 +133,96 @@ TEST(JobCache, AJobInUseIsNotForgotten) {
     EXPECT_FALSE(cache.entry({0, i})->has_document()) << i;
 }
 
-// What a job holds is nowhere else: its scene may go, its states not.
-TEST(JobCache, WhatAJobHoldsOutlivesItsScene) {
-  JobCache cache([](const JobDocument& document) -> Result<LoadedJobPtr> {
-    auto job = std::make_shared<LoadedJob>(LoadedJob{{}, document.job, {}, nullptr});
-    job->states = std::make_shared<JobStates>(std::make_shared<MemoryShare>(1 << 20));
-    return LoadedJobPtr(std::move(job));
-  });
-  const auto load = [&](const Digest& job) {
-    const auto entry = cache.entry(job);
+/// A cache of jobs whose states are one pixel each.
+class JobCacheStates : public testing::Test {
+ protected:
+  JobCacheStates() {
+    SampleState state;
+    state.resize(sample_format(), {0, 0, 1, 1}, 1);
+    state_ = std::make_shared<const SampleState>(std::move(state));
+    share_ = room(2 * state_->size_bytes());
+    cache_.emplace(empty_job, share_);
+  }
+  LoadedJobPtr load(const Digest& job) {
+    const auto entry = cache_->entry(job);
     entry->provide({job, "text"});
     return entry->load({}).value();
-  };
-  const BlobRef held{BlobKind::state, 0, 0, held_state_name({1, 1}, Step(0), 0)};
-  const auto state = std::make_shared<const SampleState>();
-  ASSERT_TRUE(load({1, 1})->states->hold(held, state));
-  for (std::uint64_t i = 0; i < 2 * limits::kMaxCachedJobs; ++i) (void)load({2, i});
-  EXPECT_FALSE(cache.entry({1, 1})->has_document()) << "its scene is gone";
-  EXPECT_EQ(load({1, 1})->states->find(held), state);
+  }
+  /// Loads jobs until the scenes of all others are gone.
+  void load_others(std::uint64_t first) {
+    for (std::uint64_t i = 0; i < 2 * limits::kMaxCachedJobs; ++i) (void)load({first, i});
+  }
+  bool hold(const LoadedJobPtr& job, std::int32_t tile) {
+    return job->states->hold(ref_of(job->digest, tile), state_);
+  }
+  static BlobRef ref_of(const Digest& job, std::int32_t tile) {
+    return {BlobKind::state, 0, tile, held_state_name(job, Step(0), tile)};
+  }
+  std::size_t num_held() const {
+    std::size_t count = 0;
+    for (const auto& [job, states] : cache_->states()) count += states->held().size();
+    return count;
+  }
+
+  StatePtr state_;
+  MemorySharePtr share_;
+  std::optional<JobCache> cache_;
+};
+
+// What a job holds is nowhere else: its scene may go, its states not.
+TEST_F(JobCacheStates, OutliveTheScene) {
+  ASSERT_TRUE(hold(load({1, 1}), 0));
+  load_others(2);
+  EXPECT_FALSE(cache_->entry({1, 1})->has_document()) << "its scene is gone";
+  EXPECT_EQ(load({1, 1})->states->find(ref_of({1, 1}, 0)), state_);
 
   // Without being loaded again it can still publish them.
-  for (std::uint64_t i = 0; i < 2 * limits::kMaxCachedJobs; ++i) (void)load({3, i});
-  std::size_t num_held = 0;
-  for (const auto& [job, states] : cache.states()) num_held += states->held().size();
-  EXPECT_EQ(num_held, 1u);
+  load_others(3);
+  EXPECT_EQ(num_held(), 1u);
+  EXPECT_EQ(share_->used(), state_->size_bytes());
+}
+
+// Nobody says whether a job has ended: what it holds is in the way of none that is at work.
+TEST_F(JobCacheStates, WithoutASceneMakeRoomForThoseAtWork) {
+  for (std::int32_t tile = 0; tile < 2; ++tile) ASSERT_TRUE(hold(load({1, 1}), tile));
+  load_others(2);
+  const LoadedJobPtr at_work = load({3, 3});
+  EXPECT_EQ(num_held(), 2u);
+  EXPECT_FALSE(hold(at_work, 0)) << "this one goes into the store";
+  (void)cache_->entry({3, 3});
+  EXPECT_TRUE(hold(at_work, 1));
+  EXPECT_EQ(num_held(), 1u);
+
+  // Those at work make no room for each other.
+  ASSERT_TRUE(hold(load({4, 4}), 0));
+  EXPECT_FALSE(hold(at_work, 2));
+  (void)cache_->entry({3, 3});
+  EXPECT_EQ(num_held(), 2u);
+}
+
+// One job, one list: also where an attempt of it has failed, and where it has nothing any more.
+TEST_F(JobCacheStates, AreListedOnce) {
+  const LoadedJobPtr job = load({1, 1});
+  ASSERT_TRUE(hold(job, 0));
+  load_others(2);
+  ASSERT_TRUE(hold(load({1, 1}), 1));
+  EXPECT_EQ(num_held(), 2u);
+  EXPECT_EQ(load({1, 1})->states, job->states);
+  job->states->release_before(Step(1));
+  load_others(3);
+  EXPECT_FALSE(cache_->states().contains({1, 1}));
+  EXPECT_EQ(share_->used(), 0u);
 }
 
 // Its folders may be mounted by the time that a task of it comes again.
 TEST(JobCache, AJobThatWasNotSeenIsLookedForAgain) {
   int loads = 0;
-  JobCache cache([&](const JobDocument& document) -> Result<LoadedJobPtr> {
+  const auto loader = [&](const JobDocument& document) -> Result<LoadedJobPtr> {
     auto job = std::make_shared<LoadedJob>(LoadedJob{{}, document.job, {}, nullptr});
     if (++loads == 1) job->unseen = "/shows: not there";
     return LoadedJobPtr(std::move(job));
-  });
+  };
+  JobCache cache(loader, room());
   const auto first = cache.entry({1, 1});
   first->provide({{1, 1}, "text"});
   EXPECT_EQ(first->load({}).value()->unseen, "/shows: not there");
@@ -171,10 +240,10 @@ TEST(JobCache, ADocumentOfAnotherJobIsRefused) {
 
 TEST(AssetShelf, JobsOfOneSceneShareItWhileOneOfThemLives) {
   JobSpec job = test::box_job();
-  const std::vector<AssetDigest> files{{"map.exr", {1, 2}}};
+  const std::vector<KnownAsset> files{{{"map.exr", {1, 2}}, {}}};
   AssetShelf shelf;
   const MemoryBudget memory = MemoryBudget::of_machine();
-  const auto get = [&](const JobSpec& of, const std::vector<AssetDigest>& with) {
+  const auto get = [&](const JobSpec& of, const std::vector<KnownAsset>& with) {
     return shelf.get(of, with, memory, memory.scene_bytes);
   };
   auto first = get(job, files).value();
@@ -183,7 +252,8 @@ TEST(AssetShelf, JobsOfOneSceneShareItWhileOneOfThemLives) {
   EXPECT_EQ(get(job, files).value(), first);
 
   // Another file content or another scene is loaded anew.
-  EXPECT_NE(get(job, {{"map.exr", {1, 3}}}).value(), first);
+  EXPECT_EQ(get(job, {{{"map.exr", {1, 2}}, {.size_bytes = 5}}}).value(), first);
+  EXPECT_NE(get(job, {{{"map.exr", {1, 3}}, {}}}).value(), first);
   job.scene.ground->size += 1;
   EXPECT_NE(get(job, files).value(), first);
   job.scene.ground->size -= 1;
@@ -192,6 +262,23 @@ TEST(AssetShelf, JobsOfOneSceneShareItWhileOneOfThemLives) {
   const std::weak_ptr<const SharedAssets> gone = first;
   first.reset();
   EXPECT_TRUE(gone.expired());
+}
+
+// A file that stands as it did is not read again to see what is in it.
+TEST(KnownAsset, IsReadAgainWhereItStandsOtherwise) {
+  const std::string path = (test::test_folder() / "plate.png").string();
+  ASSERT_TRUE(write_file_atomic(path, as_bytes_view("1234")));
+  KnownAsset known{{path, digest_of("not this")}, *stamp_of(path).value()};
+  EXPECT_TRUE(verify_asset({known}, path)) << "it is not read";
+  EXPECT_TRUE(verify_asset({known}, "another.png"));
+  known.stamp.time_ns -= 1;
+  const Status changed = verify_asset({known}, path);
+  ASSERT_FALSE(changed);
+  EXPECT_EQ(changed.error().kind, ErrorKind::bad_input);
+  EXPECT_NE(changed.error().message.find("plate.png: changed since the job was submitted"),
+            std::string::npos);
+  known.file.digest = digest_of("1234");
+  EXPECT_TRUE(verify_asset({known}, path));
 }
 
 TEST(MapCache, AMapIsReadOncePerTable) {
@@ -209,6 +296,24 @@ TEST(MapCache, AMapIsReadOncePerTable) {
   coarse.max_width = 2;
   EXPECT_EQ(maps.get(path, coarse, false).value()->width(), 2);
   EXPECT_FALSE(maps.get("nowhere.exr", job.environment, false));
+}
+
+// An error of the moment is waited for; what is wrong with a map stays wrong.
+TEST(MapCache, AMapThatCannotBeReadIsReadAgain) {
+  const JobSpec job = test::box_job();
+  int reads = 0;
+  ErrorKind kind = ErrorKind::io;
+  MapCache maps(room(std::uint64_t{1} << 30), [&](const std::string& path) -> Result<RgbImage> {
+    if (++reads == 1) return Error{kind, path + ": Input/output error"};
+    return read_rgb_image(path);
+  });
+  const std::string& path = job.environment.keys.front().map;
+  EXPECT_TRUE(maps.get(path, job.environment, false));
+  EXPECT_EQ(reads, 2);
+  reads = 0;
+  kind = ErrorKind::bad_input;
+  EXPECT_FALSE(maps.get(path, job.environment, true));
+  EXPECT_EQ(reads, 1);
 }
 
 }  // namespace

@@ -75,6 +75,14 @@ TEST(JoinStates, PartsThatDoNotFitAreRefused) {
       join_states(std::array<const SampleState*, 2>{&a, &other}, {0, 0, 7, 4}, 9).error().message,
       testing::HasSubstr("another picture, frame or layout"));
   EXPECT_FALSE(join_states({}, {0, 0, 1, 1}, 9));
+
+  // Tiles that cut blocks: what these remember is in no part.
+  const SampleState left = state_of(memory_format(), {0, 0, 6, 8}, 0);
+  const SampleState right = state_of(memory_format(), {6, 0, 12, 8}, 1);
+  EXPECT_EQ(join_states(std::array<const SampleState*, 2>{&left, &right}, {0, 0, 12, 8}, 9)
+                .error()
+                .message,
+            "joining states for tile 9: 2 of 6 blocks of 4 x 4 pixels lie in none of them whole");
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ TEST(SampleState, RemembersRaysOfCatchersApart) {
   SampleState state = remembering_state();
   state.resize(memory_format(true), state.rect, 0);
   state.source[1] = PixelSource::catcher;
-  block_memory_plane(state, true)[1].cells[9] = {7, 7};
+  block_memory_plane(state, 1)[1].cells[9] = {7, 7};
   block_memory_plane(state)[0].cells[8] = {3, 0};
   EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
 }
@@ -110,11 +110,55 @@ TEST(MemoryFormat, ABlockInheritsHalfOfTheMeanOfItsSources) {
   block_memory_plane(old)[1].cells[300] = {255, 1};
   SampleState now;
   now.resize(memory_format(), {0, 0, 4, 4}, 0);
-  const StateFormat::BlockSource sources[] = {{&old, 0, false, 3}, {&old, 1, false, 1}};
+  const StateFormat::BlockSource sources[] = {{&old, 0, 0, 3}, {&old, 1, 0, 1}};
   memory_format().inherit_block(sources, now, 0);
   EXPECT_EQ(block_memory_plane(now)[0].cells[7], (VisibilityCell{40, 25}));
   EXPECT_EQ(block_memory_plane(now)[0].cells[300], (VisibilityCell{31, 0}));
   EXPECT_EQ(block_memory_plane(now)[0].cells[8], VisibilityCell());
+}
+
+// Everything moves by a block: blocks of objects inherit from those of objects, and so do those of
+// catchers, whatever the other plane has at the same place.
+TEST(MemoryFormat, CatchersInheritFromCatchers) {
+  SampleState old, now;
+  for (SampleState* state : {&old, &now}) state->resize(memory_format(true), {0, 0, 12, 4}, 0);
+  for (std::size_t block = 0; block < 3; ++block) {
+    const auto number = static_cast<std::uint8_t>(10 * block + 10);
+    block_memory_plane(old, 0)[block].cells[5] = {number, number};
+    block_memory_plane(old, 1)[block].cells[6] = {static_cast<std::uint8_t>(number + 100), 2};
+  }
+  const StateFormat::BlockSource to_first[] = {{&old, 1, 0, 16}};
+  const StateFormat::BlockSource to_second[] = {{&old, 2, 1, 9}, {&old, 2, 0, 7}};
+  memory_format(true).inherit_block(to_first, now, 0);
+  memory_format(true).inherit_block(to_second, now, 1);
+  EXPECT_EQ(block_memory_plane(now, 0)[0].cells[5], (VisibilityCell{10, 10}));
+  EXPECT_EQ(block_memory_plane(now, 1)[0], BlockMemory());
+  EXPECT_EQ(block_memory_plane(now, 0)[1].cells[5], (VisibilityCell{15, 15}));
+  EXPECT_EQ(block_memory_plane(now, 1)[1].cells[6], (VisibilityCell{65, 1}));
+  EXPECT_EQ(block_memory_plane(now, 0)[1].cells[6], VisibilityCell());
+  EXPECT_EQ(block_memory_plane(now, 0)[2], BlockMemory());
+}
+
+// Whatever a block's pixels come from: half of the mean, rounded down, is at most one less, and no
+// bin has more free rays than rays.
+TEST(MemoryFormat, AMeanIsRoundedDown) {
+  SampleState old, now;
+  old.resize(memory_format(), {0, 0, 12, 4}, 0);
+  now.resize(memory_format(), {0, 0, 4, 4}, 0);
+  for (std::int32_t a = 0; a <= 14; ++a) {
+    for (std::int32_t b = 0; a + b <= 15; ++b) {
+      for (const VisibilityCell cell : {VisibilityCell{255, 255}, {255, 254}, {1, 1}, {7, 6}}) {
+        for (BlockMemory& memory : block_memory_plane(old)) memory.cells[0] = cell;
+        const StateFormat::BlockSource sources[] = {
+            {&old, 0, 0, a}, {&old, 1, 0, b}, {&old, 2, 0, 16 - a - b}};
+        memory_format().inherit_block(sources, now, 0);
+        const VisibilityCell half = block_memory_plane(now)[0].cells[0];
+        EXPECT_LE(half.seen, cell.seen / 2);
+        EXPECT_GE(half.seen + 1, cell.seen / 2);
+        EXPECT_LE(half.free, half.seen);
+      }
+    }
+  }
 }
 
 TEST(SampleState, RefusesTalliesPastTheMost) {

@@ -50,10 +50,17 @@ PixelMethod make_pool_method(const JobSpec& job, const PoolTuning& tuning) {
           }};
 }
 
-const VisibilityTable& PoolSampler::table_of(const PixelState& pixel, bool sees_catcher) {
-  const std::pair wanted(PixelBlocks(pixel.tile.rect).of(pixel.index), sees_catcher);
+/// What the pixel's rays go into.
+BlockMemory& PoolSampler::memory_of(const PixelState& pixel) {
+  return block_memory_plane(pixel.tile,
+                            StateFormat::block_plane_of(
+                                pixel.sees_catcher))[PixelBlocks(pixel.tile.rect).of(pixel.index)];
+}
+
+const VisibilityTable& PoolSampler::table_of(const PixelState& pixel) {
+  const BlockMemory* const wanted = &memory_of(pixel);
   if (!has_table_ || wanted != table_is_of_) {
-    table_.read(block_memory_plane(pixel.tile, sees_catcher)[wanted.first], tuning_.prior_rays);
+    table_.read(*wanted, tuning_.prior_rays);
     table_is_of_ = wanted;
     has_table_ = true;
   }
@@ -65,10 +72,9 @@ const VisibilityTable& PoolSampler::table_of(const PixelState& pixel, bool sees_
 void PoolSampler::look_ahead(const RoundLight& /*light*/, bool /*has_history*/,
                              const PixelState& pixel) {
   if (!remembers_) return;
-  const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
-  if (has_table_ && block == table_is_of_.first) return;
-  const auto* const bytes =
-      reinterpret_cast<const std::byte*>(&std::as_const(block_memory_plane(pixel.tile)[block]));
+  const BlockMemory* const memory = &memory_of(pixel);
+  if (has_table_ && memory == table_is_of_) return;
+  const auto* const bytes = reinterpret_cast<const std::byte*>(memory);
   for (std::size_t at = 0; at < sizeof(BlockMemory); at += 64) __builtin_prefetch(bytes + at);
 }
 
@@ -79,9 +85,7 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, const PixelState& 
   poison(rays_);
   static const PixelMemory kUnknown{};
   PixelMemory* const own = remembers_ ? &pixel_memory_plane(pixel.tile)[pixel.index] : nullptr;
-  const auto seen = std::ranges::find_if(input.hits, &SurfaceHit::hit);
-  const bool sees_catcher = seen != input.hits.end() && seen->is_catcher;
-  const PixelVisibility memory(remembers_ ? table_of(pixel, sees_catcher) : kNothing,
+  const PixelVisibility memory(remembers_ ? table_of(pixel) : kNothing,
                                own != nullptr ? *own : kUnknown, tuning_.own_prior_rays);
   const kernels::CandidateCounts counts =
       counts_for_noise(tuning_, input.sites, num_candidates_, lobe_fraction_,
@@ -98,9 +102,7 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, const PixelState& 
 
 void PoolSampler::learn(const FoundRays& found, const PixelState& pixel) {
   if (!remembers_) return;
-  const std::size_t block = PixelBlocks(pixel.tile.rect).of(pixel.index);
-  const bool sees_catcher = pixel.tile.latest_source(pixel.index) == PixelSource::catcher;
-  remember_rays(found.tag, found.is_free, block_memory_plane(pixel.tile, sees_catcher)[block],
+  remember_rays(found.tag, found.is_free, memory_of(pixel),
                 pixel_memory_plane(pixel.tile)[pixel.index]);
 }
 

@@ -26,15 +26,15 @@ class PoolSampler final : public ChosenRaysSampler {
   const LightVariance& light_variance_seen() const { return rays_.light_variance; }
 
  private:
-  /// Of the pixel's block, of catchers or of the others.
-  const VisibilityTable& table_of(const PixelState& pixel, bool sees_catcher);
+  static BlockMemory& memory_of(const PixelState& pixel);
+  const VisibilityTable& table_of(const PixelState& pixel);
 
   bool remembers_;
   PoolTuning tuning_;
   /// What the block of the pixel that was sampled last expects. All pixels of a block are sampled
   /// before any of them learns.
   VisibilityTable table_;
-  std::pair<std::size_t, bool> table_is_of_{};
+  const BlockMemory* table_is_of_ = nullptr;
   bool has_table_ = false;
   kernels::PoolScratch scratch_;
 };
