@@ -10,14 +10,15 @@ namespace baton {
 
 /// How a command about a job in this status ends; running and paused are ok.
 ExitCode exit_code_of(JobStatus status);
-/// The same of one that nobody follows any more: io where it waits for somebody.
+/// How a command ends about a job in this status that nobody follows any more; io where it waits
+/// for somebody.
 ExitCode exit_code_of_stopped(JobStatus status);
-/// The same; io where it has failed since frames are not what it has written.
+/// How a command about a job ends; io where it has failed since frames are not what it has written.
 ExitCode exit_code_of(const JobDetail& detail);
 
 /// The job's line in a list.
 std::string job_line(const ListedJob& job);
-/// The same with owner, priority and times.
+/// The job's line in a list with owner, priority and times.
 std::string long_job_line(const ListedJob& job);
 /// When the job was submitted, started and ended, as far as that is known, a line each.
 std::string times_text(const JobTimes& times);

@@ -8,9 +8,10 @@ again and again until N faults have struck. Kinds of faults are dealt like cards
 again. Then the farm is left alone, and each job must end as done. Files of jobs that are done are not struck.
 
 Checked at the end: the pixels are those of an undisturbed run with one instruction set and the job's last settings; no task was
-done under two digests; nothing was done again that no fault explains; no lease was taken from a worker for the sake of an older one, and no older one was kept; when all is
-done nobody reports any more; no temporary file is left. Where the machine lets it mount, the store lies on a small disk that
-is filled, folders become read-only, and power cuts take every file that no program had waited for the disk with.
+done under two digests; nothing was done again that no fault explains; no lease was taken from a worker for the sake of an older
+one, and no older one was kept; when all is done nobody reports any more; no temporary file is left. Where the machine lets it
+mount, the store lies on a small disk that is filled, folders become read-only, and power cuts take every file that no program
+had waited for the disk with.
 """
 
 import argparse
@@ -26,7 +27,7 @@ from pathlib import Path
 import chaos_witness as witness
 from chaos_disk import Disk, PowerCut, enter_namespace, may_mount
 from chaos_faults import NUM_WORKERS, Chaos
-from chaos_jobs import Undisturbed
+from chaos_jobs import FOREIGN_ISA, Undisturbed
 from farm import PATIENCE, Farm, Fault, Programs, check, wait_until
 
 END_S = 300 * PATIENCE
@@ -75,7 +76,7 @@ def run(programs, folder, num_faults, seed, longest_freeze_s=5):
     """Everything. Raises Fault."""
     rng = random.Random(seed)
     folder.mkdir(parents=True, exist_ok=True)
-    expected = Undisturbed(programs, folder / "plain")
+    expected = Undisturbed(programs, folder / "plain", ("auto", FOREIGN_ISA))
     with contextlib.ExitStack() as stack:
         disk = Disk(folder / "farm/work", folder / "farm/frames") if may_mount() else None
         if disk:

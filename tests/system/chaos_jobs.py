@@ -80,10 +80,10 @@ def edits_of(job, rng):
 
 
 class Undisturbed:
-    """What the frames of a job show when nothing happens to it."""
+    """What the frames of a job show when nothing happens to it. isas: instruction sets of the workers that there may be."""
 
-    def __init__(self, programs, folder):
-        self._programs, self._folder, self._known = programs, folder, {}
+    def __init__(self, programs, folder, isas=("auto",)):
+        self._programs, self._folder, self._isas, self._known = programs, folder, isas, {}
 
     def of(self, job, isa):
         """File name of each frame of the job -> pixels, rendered with an instruction set."""
@@ -101,10 +101,10 @@ class Undisturbed:
         """All frames of the job are there, and those of one instruction set."""
         got = self._programs.pixels(job.frames)
         faults = []
-        for isa in ("auto", FOREIGN_ISA):
+        for isa in self._isas:
             wrong = [f"{frame}: {'other pixels' if frame in got else 'missing'}"
                      for frame, pixels in self.of(job, isa).items() if got.get(frame) != pixels]
             if not wrong:
                 return
-            faults.append(wrong[0])
-        raise Fault(f"{job.frames}: {faults[0]}, and with {FOREIGN_ISA} {faults[1]}; the job's edits: {job.edits}")
+            faults.append(f"with {isa} {wrong[0]}")
+        raise Fault(f"{job.frames}: {', and '.join(faults)}; the job's edits: {job.edits}")

@@ -22,8 +22,8 @@ JOB_DEADLINE_S = min(DEADLINE_S, 60 * PATIENCE)
 AUTO_DEADLINE_S = 10 * JOB_DEADLINE_S
 # Exit code of a `baton render` that was asked to stop.
 CANCELLED = 3
-# What a worker says that has too little memory for a job, rather than for what it would keep.
 BLOCK = 4  # side of the blocks of pixels that have a memory in common
+# What a worker says that has too little memory for a job, rather than for what it would keep.
 NO_ROOM = "does not fit into memory"
 # How each fault of a job or of its files begins.
 FAULT_LINE = re.compile(r"\S.*: .")

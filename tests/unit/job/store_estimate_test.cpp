@@ -76,6 +76,24 @@ TEST(StoreEstimate, MemoriesGrowWithTheFramesUntilAllBinsAreKnown) {
   EXPECT_LT(states(3000), bound_store(job_of(Method::pool, 3000)).states);
 }
 
+// As measured on the demo (320 x 180 pixels, tiles of 64, of 57600 pixels 39,600 with a surface):
+// within a tenth.
+TEST(StoreEstimate, IsThatOfTheDemo) {
+  const struct {
+    int num_particles, frames;
+    double measured_bytes;
+  } rows[] = {{64, 2, 1139237}, {64, 12, 1326244}, {16, 2, 1038647}, {16, 12, 1256933}};
+  for (const auto& row : rows) {
+    JobSpec job = job_of(Method::pool, row.frames);
+    job.image.width = 320;
+    job.image.height = 180;
+    job.sampling.num_particles = row.num_particles;
+    job.state.checkpoint_every = 1000;
+    const auto states = static_cast<double>(estimate_store(job, 39600.0 / 57600).states);
+    EXPECT_NEAR(states / row.measured_bytes, 1, 0.1) << row.num_particles << " " << row.frames;
+  }
+}
+
 // All that is likely is possible.
 TEST(StoreEstimate, IsWithinItsBound) {
   for (const Method method : {Method::pool, Method::sequential, Method::bidirectional}) {

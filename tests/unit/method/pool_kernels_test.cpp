@@ -6,6 +6,7 @@
 #include <hwy/targets.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -158,6 +159,52 @@ TEST_P(PoolRays, ReadTheMemoryAlikeOnEverySet) {
   for (std::size_t j = 0; j < rays->count; ++j) {
     EXPECT_EQ(RayTag{rays->tag[j]}.bin(), visibility_bin(encode_octahedral(direction(j))));
   }
+}
+
+// A sun among a sky of which every pixel gets a tenth of its candidates: what comes from where the
+// map's table is denser than 1 / pi goes into the bins of lamps, wherever the candidate is from.
+TEST_P(PoolRays, OfLampsHaveBinsOfTheirOwn) {
+  RgbImage image{32, 16, {}};
+  for (int i = 0; i < 32 * 16; ++i)
+    image.rgb.insert(image.rgb.end(), 3, i % 32 / 3 == 5 && i / 32 / 3 == 1 ? 300.0f : 1.0f);
+  const Environment sun{
+      std::make_shared<EnvironmentMap>(image, MapFilter::nearest, 1.0f, false, HiddenCone{}, 0.1f),
+      Mat3{}};
+  const EnvironmentView map = view_of(sun);
+  const PresampledLight pool = presample_light(sun, sun, 3, 2, {.one_run = true});
+  for (const PresampledLight::Block& block : pool.blocks) {
+    for (std::size_t j = 0; j < PresampledLight::kBlock; ++j) {
+      const float density = sun.evaluate(decode_octahedral(block.code[j])).density;
+      ASSERT_NEAR(density * block.inverse_density[j], 1, 1e-4f);
+    }
+  }
+
+  const SiteBlock sites = pixel(true);
+  const CandidateCounts of{.from_light = 320, .from_bsdf = 320, .lobe_only = true};
+  const kernels::CandidateSource source{sites, map, pool, of, rng.bits(0, 0)};
+  kernels::choose_pool_rays(tuning, source, 0.5f, 16, PixelVisibility(table_of(memory_after(200))),
+                            *scratch, *rays);
+  auto candidates = std::make_unique<kernels::CandidateSet>();
+  kernels::draw_candidates(source, *candidates);
+  std::array<int, 2> lamps{}, others{};  // of candidates from the light, from lobes
+  for (std::size_t i = 0; i < static_cast<std::size_t>(candidates->count); ++i) {
+    const OctDirection code = candidates->code[i];
+    if (!(candidates->weight[i] > 0)) continue;
+    const bool is_lamp = sun.evaluate(decode_octahedral(code)).density > 1 / kPi;
+    ASSERT_EQ(static_cast<std::size_t>(scratch->lines.bins[i]), visibility_bin(code, is_lamp));
+    ASSERT_EQ(scratch->lines.bins[i] >= 256, is_lamp);
+    ++(is_lamp ? lamps : others)[i < 320 ? 0 : 1];
+  }
+  for (const int count : {lamps[0], lamps[1], others[0], others[1]}) EXPECT_GT(count, 0);
+  std::size_t rays_to_lamps = 0;
+  for (std::size_t j = 0; j < rays->count; ++j) {
+    const bool is_lamp = sun.evaluate(direction(j)).density > 1 / kPi;
+    EXPECT_EQ(RayTag{rays->tag[j]}.bin() >= 256, is_lamp);
+    rays_to_lamps += is_lamp ? 1 : 0;
+  }
+  EXPECT_GT(rays_to_lamps, 0u);
+  EXPECT_LT(rays_to_lamps, rays->count);
+  expect_mean(sites, map, pool, of, 16, 4000, is_free);
 }
 
 // What a pixel learns of the noise of its light, against the variance that 2000 runs show. Second

@@ -85,7 +85,10 @@ enum class Fault {
   none,
   rays_of_this_frame,
   more_rays_after_a_blocked_one,
-  candidates_by_noise_of_this_frame
+  candidates_by_noise_of_this_frame,
+  /// No bias: the block has learnt from a neighbour that reads the same candidates, and to whom the
+  /// same states are free in this frame. The order of pixels would show, that is all.
+  rays_of_a_neighbour
 };
 
 struct FrameEstimate {
@@ -131,6 +134,15 @@ class PoolChain {
     // Choose rays and trace them.
     Memory learnt{memory_, own_};
     table_.read(memory_, kTuning.prior_rays);
+    if (fault_ == Fault::rays_of_a_neighbour) {
+      for (std::size_t i = 0; i < kStates; ++i) free_now_[i] = uniform() < kVisible[i];
+      choose(uniform());
+      bool unused = false;
+      Memory of_neighbour = learnt;
+      if (space_.rays.count > 0) trace(of_neighbour, unused);
+      learnt.block = of_neighbour.block;
+      table_.read(learnt.block, kTuning.prior_rays);
+    }
     FrameEstimate e{.lns = choose(uniform())};
     if (space_.rays.count == 0) return e;
     const LightVariance seen = space_.rays.light_variance;
@@ -168,7 +180,9 @@ class PoolChain {
       candidates.weight[i] = now[state] * kStates / static_cast<float>(count);
     }
   }
-  bool is_free(std::size_t state) { return uniform() < kVisible[state]; }
+  bool is_free(std::size_t state) {
+    return fault_ == Fault::rays_of_a_neighbour ? free_now_[state] : uniform() < kVisible[state];
+  }
 
   /// Chooses rays by what the frames before left; returns Lns.
   double choose(float u) {
@@ -210,6 +224,7 @@ class PoolChain {
   BlockMemory memory_;
   PixelMemory own_;
   VisibilityTable table_;
+  std::array<bool, kStates> free_now_{};  ///< with rays_of_a_neighbour
 };
 
 }  // namespace baton::HWY_NAMESPACE

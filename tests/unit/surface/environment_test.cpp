@@ -200,6 +200,72 @@ TEST(Environment, WhatIsHiddenIsSeenAndNotSampled) {
   }
 }
 
+/// Share of the density that goes by capped radiance.
+constexpr float kCapped = 0.1f;
+
+/// What is above `most` (mean over RGB) is scaled down to it.
+RgbImage capped(RgbImage image, double most) {
+  for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
+    const double mean = (double{image.rgb[i]} + image.rgb[i + 1] + image.rgb[i + 2]) / 3;
+    for (std::size_t c = i; mean > most && c < i + 3; ++c)
+      image.rgb[c] = static_cast<float>(image.rgb[c] * most / mean);
+  }
+  return image;
+}
+
+// A tenth of the directions go by radiance capped at the map's mean.
+TEST(Environment, ACappedShareIsLeftToWhatIsNoLamp) {
+  for (const RgbImage& image : {random_image(32, 16, 5), sun_image(), grey_image(8, 4, 2)}) {
+    for (const MapFilter filter : kFilters) {
+      const EnvironmentMap plain(image, filter, 1, false);
+      const EnvironmentMap map(image, filter, 1, false, {}, kCapped);
+      const double power = plain.total_power(), mean = power / (4 * kPiDouble);
+      const double capped_power =
+          EnvironmentMap(capped(image, mean), filter, 1, false).total_power();
+      EXPECT_EQ(map.total_power(), power);
+      for (int j = 0; j < image.height; ++j) {
+        for (int i = 0; i < image.width; ++i) {
+          const Vec3 w = direction_at(i + 0.5, j + 0.5, image.width, image.height);
+          const float* const rgb = &image.rgb[3 * (static_cast<std::size_t>(j) * image.width + i)];
+          const double light = (double{rgb[0]} + rgb[1] + rgb[2]) / 3;
+          const double expected = (1 - double{kCapped}) * light / power +
+                                  kCapped * std::min(light, mean) / capped_power;
+          ASSERT_NEAR(map.evaluate(w).density / expected, 1, 2e-3) << i << ", " << j;
+          ASSERT_EQ(map.evaluate(w).g, plain.evaluate(w).g);
+        }
+      }
+    }
+  }
+}
+
+TEST(Environment, SamplesOfCappedLightFollowTheirDensity) {
+  constexpr int kTests = 14;
+  const double level = test::sidak_level(0.01, kTests);
+  const auto expect_right = [&](const EnvironmentMap& map, const std::string& name) {
+    const auto result = run_chi_square(map, map);
+    EXPECT_GT(result.p_value, level)
+        << name << ": chi2 " << result.statistic << " of " << result.degrees_of_freedom;
+    EXPECT_NEAR(sum_of(cell_probabilities(map)), 1, 1e-5) << name;
+  };
+  for (const MapFilter filter : kFilters) {
+    for (const Case& c : all_cases()) {
+      if (!c.compensate && c.image.width >= 8)
+        expect_right({c.image, filter, 1, false, {}, kCapped}, c.name);
+    }
+    const RgbImage image = sun_image();
+    const EnvironmentMap hidden(image, filter, 1, false, kTiltedCone, kCapped);
+    expect_right(hidden, "hidden");
+    const EnvironmentMap other(random_image(32, 16, 6), filter, 1, false, kTiltedCone, kCapped);
+    expect_right({hidden, other, 0.3f, 2, false, kCapped}, "mixed");
+
+    // The machinery sees a table that forgets the share.
+    const EnvironmentMap plain(image, filter, 1, false);
+    const EnvironmentMap map(image, filter, 1, false, {}, kCapped);
+    EXPECT_LT(run_chi_square(plain, map).p_value, 1e-6);
+    EXPECT_LT(run_chi_square(map, plain).p_value, 1e-6);
+  }
+}
+
 TEST(Environment, ChiSquareSeesAWrongTable) {
   RgbImage other = random_image(32, 16, 5);
   for (int i = 0; i < 32; ++i) set_texel(other, i, 8, {6, 6, 6});
