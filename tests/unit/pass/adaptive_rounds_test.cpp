@@ -54,14 +54,20 @@ TEST(AdaptiveRounds, SameBytesForAnyTilingAndAnyRunLength) {
 TEST(AdaptiveRounds, NoiseThatNobodyReachesTakesAllRounds) {
   for (const bool with_catcher : {false, true}) {
     JobSpec job = adaptive_job(Method::pool, 1e-9f);
-    std::erase(job.output.aovs, Aov::variance);  // told of two parts apart
+    std::erase(job.output.aovs, Aov::variance);
     if (with_catcher) {
       job.scene.ground->catcher = true;
       job.output.background = Background::transparent;
     }
-    const FilmTile adaptive = render_tile(job).films.back();
+    // But for the error, which is told of two parts apart.
+    const auto picture = [](const JobSpec& of) {
+      FilmTile film = render_tile(of).films.back();
+      std::fill_n(film.find(kErrorChannel), film.num_pixels(), kErrorUnknown);
+      return film;
+    };
+    const FilmTile adaptive = picture(job);
     job.quality.adaptive_threshold.reset();
-    EXPECT_EQ(render_tile(job).films.back(), adaptive) << with_catcher;
+    EXPECT_EQ(picture(job), adaptive) << with_catcher;
   }
 }
 

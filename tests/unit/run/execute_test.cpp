@@ -278,6 +278,7 @@ TEST_F(ExecuteTest, AnInputThatComesLateIsWaitedFor) {
 
 TEST_F(ExecuteTest, AStoreThatIsAwayIsWaitedForWithTheFilmInHand) {
   const auto expected = render(baton::Run(0), 0, {}).value().made.outputs;
+  std::filesystem::remove_all(folder_ + "store");  // of a run of this test before
   store_ = BlobStore::open(folder_ + "store");
   const auto renderings = count_renderings();
   const auto lose = [&] {
