@@ -202,8 +202,8 @@ Status write_file_verified(const fs::path& path, ByteView bytes,
   BATON_ASSIGN(NewFile file, NewFile::create(path));
   BATON_TRY(file.write(bytes));
   BATON_TRY(file.sync());
-  BATON_TRY(check(file.path()));
   BATON_TRY(expect_content(file.path(), bytes));
+  BATON_TRY(check(file.path()));
   BATON_TRY(file.publish());
   return file.sync_name();
 }

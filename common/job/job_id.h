@@ -43,8 +43,6 @@ struct JobIdentity {
   JobId id;
   std::int32_t version = 1;  ///< of the document in work, counted from 1
   JobTimes times;
-  /// Frames that count as done, whatever is in their files; ascending.
-  std::vector<FrameNumber> locked = {};
 
   bool operator==(const JobIdentity&) const = default;
 };

@@ -68,6 +68,9 @@ struct BlobRef {
   /// An image that counts as made whatever its bytes are: that of a locked frame.
   static BlobRef any_image(FrameIndex frame) { return {BlobKind::image, frame.value(), 0, {}, 0}; }
   bool is_any_image() const { return kind == BlobKind::image && digest == Digest(); }
+  /// Whether `digest` says nothing of any bytes: two placeholders, or one and a blob, cannot be
+  /// compared.
+  bool is_placeholder() const { return is_held() || is_any_image(); }
   /// The frame of an image.
   FrameIndex frame() const;
   /// The step of a state, a film or first-pass samples.
@@ -129,6 +132,9 @@ struct Grant {
   Step states_from{};     ///< no task needs states of earlier steps
   /// CPU time, as the longest of late; 0: not known.
   double expected_seconds = 0;
+  /// Digests of pictures that an assembly may replace (as far as the coordinator knows that some
+  /// are there).
+  std::vector<Digest> may_replace = {};
 };
 
 /// What the sampler did with the pixels that see a surface; merging is addition.

@@ -61,6 +61,10 @@ struct LeaseReturn {
   std::string unseen = {};
   /// Held inputs of the task that are not here any more: what made them must be done again.
   std::vector<BlobRef> not_held = {};
+  /// Another whole picture in the place of the task's frame, and which job it names, in hexadecimal
+  /// digits, if any; zero: none. It is there as it was.
+  Digest in_place = {};
+  std::string writer = {};
 };
 struct JobDocumentRequest {
   Digest job;
@@ -224,6 +228,8 @@ struct ShownJob {
   bool lacks_renderer = false;
   /// After each number of sweeps since its submission: the noise, and how many more there are.
   std::vector<std::string> growth = {};
+  /// Frames that count as done, whatever is in their files; ascending.
+  std::vector<FrameNumber> locked = {};
 };
 /// Events of a kind that are forgotten.
 struct ForgottenEvents {

@@ -127,6 +127,9 @@ struct Socket::Impl {
   Clock::time_point next_closing;
 };
 
+void Socket::hang_up() { impl_->socket.disconnect(impl_->endpoint); }
+void Socket::dial() { impl_->socket.connect(impl_->endpoint); }
+
 Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Socket::Socket(Socket&&) noexcept = default;
 Socket& Socket::operator=(Socket&&) noexcept = default;

@@ -49,6 +49,9 @@ class Socket {
   std::optional<std::vector<Bytes>> receive(std::chrono::milliseconds timeout);
   /// The public key of who sent the last message; empty: without keys.
   const std::string& sender_key() const;
+  /// Ends the connection of a socket that connects; dial() makes it again. What is queued is lost.
+  void hang_up();
+  void dial();
   /// Why a connection was refused, by either side, once. usage: the key is not known, or the
   /// other side spoke against the rules; timeout: it was broken off, which may have other reasons.
   std::optional<Error> take_refusal();

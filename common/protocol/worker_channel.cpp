@@ -16,7 +16,14 @@ Result<WorkerChannel> WorkerChannel::connect(const std::string& endpoint,
   return WorkerChannel(std::move(socket));
 }
 
-bool WorkerChannel::send(const Message& message) { return socket_.send(encode_message(message)); }
+void WorkerChannel::hang_up() {
+  if (!std::exchange(is_hung_up_, true)) socket_.hang_up();
+}
+
+bool WorkerChannel::send(const Message& message) {
+  if (std::exchange(is_hung_up_, false)) socket_.dial();
+  return socket_.send(encode_message(message));
+}
 
 std::optional<Message> WorkerChannel::receive(std::chrono::milliseconds timeout) {
   const std::optional<std::vector<Bytes>> frames = socket_.receive(timeout);

@@ -16,6 +16,8 @@ class WorkerChannel {
   static Result<WorkerChannel> connect(const std::string& endpoint,
                                        const ClientAccess& access = {});
 
+  /// Ends the connection until the next send(): somebody else needs it more.
+  void hang_up();
   /// Queues the message without waiting; false when the queue is full: the coordinator has been
   /// away for long.
   bool send(const Message& message);
@@ -31,6 +33,7 @@ class WorkerChannel {
   explicit WorkerChannel(Socket socket) : socket_(std::move(socket)) {}
 
   Socket socket_;
+  bool is_hung_up_ = false;
 };
 
 }  // namespace baton

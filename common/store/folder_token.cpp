@@ -9,7 +9,7 @@
 namespace baton {
 namespace {
 
-constexpr std::uint64_t kMaxTokenBytes = 64;
+constexpr std::uint64_t kMaxTokenBytes = 1 << 20;
 
 }  // namespace
 
@@ -26,19 +26,27 @@ Result<std::string> make_token(const std::filesystem::path& file, const std::str
   return token;
 }
 
-Status write_token(const std::filesystem::path& file, const std::string& token) {
-  return write_file_atomic(file, as_bytes_view(token));
+Status write_token(const std::filesystem::path& file, const std::string& token,
+                   const std::string& line) {
+  const std::string text = line.empty() ? token : token + "\n" + line;
+  return write_file_atomic(file, as_bytes_view(text));
 }
 
-Status expect_token(const std::filesystem::path& file, const std::string& token) {
+Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token) {
   const Result<std::string> found = read_text_file(file, kMaxTokenBytes);
-  if (found && *found == token) return {};
+  if (found && *found == token) return std::string();
+  if (found && found->starts_with(token + "\n")) return found->substr(token.size() + 1);
   return Error{
       ErrorKind::io,
       fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "
                   "say where it is with --map",
                   file.parent_path().string(), file.filename().string(),
                   found ? "has another token" : "not there")};
+}
+
+Status expect_token(const std::filesystem::path& file, const std::string& token) {
+  const Result<std::string> line = read_after_token(file, token);
+  return line ? Status() : line.error();
 }
 
 }  // namespace baton

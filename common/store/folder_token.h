@@ -17,9 +17,13 @@ std::filesystem::path output_token_file(const std::filesystem::path& folder, con
 /// The token in `file`; where there is none yet, `known` or, if that is empty, a new random one (16
 /// hex digits).
 Result<std::string> make_token(const std::filesystem::path& file, const std::string& known = {});
-/// Writes a token that is known.
-Status write_token(const std::filesystem::path& file, const std::string& token);
-/// The error, io, names the folder of `file`, unless the token stands there.
+/// Writes a token that is known, and a line after it, if there is one.
+Status write_token(const std::filesystem::path& file, const std::string& token,
+                   const std::string& line = {});
+/// The line after the token; empty: there is none. The error, io, names the folder of `file`: the
+/// token does not stand there.
+Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token);
+/// The same error, or none.
 Status expect_token(const std::filesystem::path& file, const std::string& token);
 
 }  // namespace baton

@@ -169,8 +169,14 @@ class Journal {
   /// Frames that count as done whatever is in their files.
   Result<std::map<JobId, std::set<FrameNumber>>> locked_frames();
   Status record_lock(const JobId& id, FrameNumber frame, bool is_locked);
+  /// Pictures in the places of frames (by normal path) that a person has given up, and that are not
+  /// replaced yet.
+  Result<std::map<std::filesystem::path, Digest>> given_up();
+  /// nullopt: it is replaced, or nobody says so any more.
+  Status record_given_up(const std::filesystem::path& file, const std::optional<Digest>& picture);
   /// An empty one: the job does not grow.
   Result<JobGrowth> growth(const JobId& id);
+  /// Likewise.
   Status record_growth(const JobId& id, const JobGrowth& growth);
   /// Appends an event; its sequence number is given here.
   Status record_event(const FarmEvent& event);

@@ -69,6 +69,24 @@ Status Journal::record_lock(const JobId& id, FrameNumber frame, bool is_locked) 
                 id.hex(), std::int64_t{frame.value()});
 }
 
+Result<std::map<std::filesystem::path, Digest>> Journal::given_up() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT file, digest FROM given_up"));
+  std::map<std::filesystem::path, Digest> given_up;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return given_up;
+    if (const std::optional<Digest> digest = Digest::from_hex(query.text(1)))
+      given_up[query.text(0)] = *digest;
+  }
+}
+
+Status Journal::record_given_up(const std::filesystem::path& file,
+                                const std::optional<Digest>& picture) {
+  const std::string name = file.lexically_normal().string();
+  if (!picture) return change("DELETE FROM given_up WHERE file = ?", name);
+  return change("INSERT OR REPLACE INTO given_up (file, digest) VALUES (?, ?)", name, *picture);
+}
+
 Result<JobGrowth> Journal::growth(const JobId& id) {
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT since_ms, sweeps, said FROM growth WHERE id = ?"));
@@ -83,6 +101,7 @@ Result<JobGrowth> Journal::growth(const JobId& id) {
 }
 
 Status Journal::record_growth(const JobId& id, const JobGrowth& growth) {
+  if (growth.since_ms == 0) return change("DELETE FROM growth WHERE id = ?", id.hex());
   return change("INSERT OR REPLACE INTO growth (id, since_ms, sweeps, said) VALUES (?, ?, ?, ?)",
                 id.hex(), growth.since_ms, std::int64_t{growth.first_sweeps},
                 fmt::format("{}", fmt::join(growth.said, "\n")));

@@ -76,10 +76,10 @@ inline constexpr const char* kSchema = R"sql(
 /// Where other tables say `job`, they mean the digest of a document: a version. `versions` says of
 /// which job (JobId) it is the n-th, `identities` when what happened to that job, `locked_frames`
 /// which of its frames count as done whatever is in their files, `growth` how it has come by its
-/// sweeps. `events` is appended to alone
-/// (FarmEvent), without an index, which would cost more than it saves; its last
-/// row stays, so that no number is given twice. Of those that are old, `event_sums` keeps count and
-/// seconds.
+/// sweeps. `given_up` has the pictures that jobs may replace though no job has written them.
+/// `events` is appended to alone (FarmEvent), without an index, which would cost more than it
+/// saves; its last row stays, so that no number is given twice. Of those that are old, `event_sums`
+/// keeps count and seconds.
 inline constexpr const char* kLaterTables = R"sql(
   CREATE TABLE IF NOT EXISTS frame_files (
     job TEXT NOT NULL, frame INTEGER NOT NULL, digest TEXT NOT NULL,
@@ -104,6 +104,7 @@ inline constexpr const char* kLaterTables = R"sql(
     PRIMARY KEY (job, kind)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS locked_frames (
     id TEXT NOT NULL, frame INTEGER NOT NULL, PRIMARY KEY (id, frame)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS given_up (file TEXT PRIMARY KEY, digest TEXT NOT NULL) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS growth (
     id TEXT PRIMARY KEY, since_ms INTEGER NOT NULL, sweeps INTEGER NOT NULL,
     said TEXT NOT NULL) WITHOUT ROWID;

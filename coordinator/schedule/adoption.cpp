@@ -25,7 +25,7 @@ bool films_alike(const JobSpec& a, const JobSpec& b) {
 class KeptFrames {
  public:
   KeptFrames(const ParsedJobDocument& wanted, const KeptFiles& files)
-      : wanted_(wanted), files_(files), images_(wanted.job.frames.size()) {
+      : wanted_(wanted), files_(files), frames_(wanted.job.frames.size()) {
     FrameIndex index{0};
     for (const FrameNumber frame : wanted.job.frames) {
       index_[frame] = index;
@@ -39,8 +39,12 @@ class KeptFrames {
       if (task.task.kind != TaskKind::assemble || task.outputs.size() != 1) continue;
       const FrameIndex old = task.task.frame();
       const auto found = index_.find(former.document.job.frames.at(old.index()));
-      if (found == index_.end() || has(found->second)) continue;
+      if (found == index_.end()) continue;
       const FrameIndex frame = found->second;
+      if (has(frame)) {
+        add_stats(former, old, task.outputs.front().digest, *frames_[frame.index()]);
+        continue;
+      }
       if (!comparison.are_equal(old, frame)) continue;
       if (!comparison.have_one_plate(old, frame)) {
         other_plates_ = true;
@@ -51,7 +55,10 @@ class KeptFrames {
       BlobRef image = task.outputs.front();
       const bool is_there = files_.locked.contains(frame) || files_.has_frame(frame, image);
       image.position = frame.value();
-      if (is_there) images_[frame.index()] = image;
+      if (is_there) {
+        frames_[frame.index()] = Completion{assemble_task(frame), {{image}}};
+        add_stats(former, old, image.digest, *frames_[frame.index()]);
+      }
       if (!is_there) lost_.insert(frame);
 
       // Which job wrote it? The headers of another job's frame differ from this one's.
@@ -66,11 +73,12 @@ class KeptFrames {
   /// After all former jobs: what none of them has recorded of a locked frame needs no record.
   void add_locked() {
     for (const FrameIndex frame : files_.locked) {
-      if (!has(frame)) images_[frame.index()] = BlobRef::any_image(frame);
+      if (!has(frame))
+        frames_[frame.index()] = Completion{assemble_task(frame), {{BlobRef::any_image(frame)}}};
     }
   }
 
-  bool has(FrameIndex frame) const { return images_[frame.index()].has_value(); }
+  bool has(FrameIndex frame) const { return frames_[frame.index()].has_value(); }
   /// Whether the frames of all these steps are kept.
   bool has_all(const Timeline& timeline, const StepSpan& steps) const {
     for (Step step = steps.first; step <= steps.last; ++step) {
@@ -80,12 +88,12 @@ class KeptFrames {
   }
   /// The number of frames where all are kept.
   FrameIndex first_open() const {
-    const auto open = std::find(images_.begin(), images_.end(), std::nullopt);
-    return FrameIndex(static_cast<std::int32_t>(open - images_.begin()));
+    const auto open = std::ranges::find_if(frames_, [](const auto& frame) { return !frame; });
+    return FrameIndex(static_cast<std::int32_t>(open - frames_.begin()));
   }
   void write_to(Adoption& adoption) const {
-    for (const auto& image : images_) {
-      if (image) adoption.images.push_back(*image);
+    for (const auto& frame : frames_) {
+      if (frame) adoption.frames.push_back(*frame);
     }
     adoption.other_plates = other_plates_;
     adoption.plan.others_frames.assign(others_.begin(), others_.end());
@@ -95,10 +103,21 @@ class KeptFrames {
   }
 
  private:
+  /// What a former job has seen of its frame `old`, if that is the one that is kept and nobody has
+  /// told yet.
+  static void add_stats(const FormerJob& former, FrameIndex old, const Digest& image,
+                        Completion& kept) {
+    const auto seen = former.frames.find(old);
+    if (seen == former.frames.end() || !kept.made.frames.empty()) return;
+    if (kept.made.outputs.front().digest != image) return;
+    kept.made.frames.push_back(seen->second);
+    kept.made.frames.back().position = kept.task.position;
+  }
+
   const ParsedJobDocument& wanted_;
   const KeptFiles& files_;
   std::map<FrameNumber, FrameIndex> index_;
-  std::vector<std::optional<BlobRef>> images_;
+  std::vector<std::optional<Completion>> frames_;
   std::set<FrameIndex> lost_, others_;
   bool other_plates_ = false;
 };

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "common/job/text/picture.h"
@@ -17,6 +19,8 @@ struct FormerJob {
   std::vector<Completions::Task> tasks;
   JobPlan plan;
   JobStatus status = JobStatus::running;
+  std::map<FrameIndex, FrameStats> frames = {};  ///< what assemblies saw
+  std::string renderer = {};                     ///< of what is done of it; empty: not known
 };
 
 /// What is there of what former jobs have made.
@@ -30,8 +34,9 @@ struct KeptFiles {
 
 /// What a new job need not do.
 struct Adoption {
-  /// Frames that are written, by the new job's index.
-  std::vector<BlobRef> images;
+  /// Frames that are written, as assemblies of the new job: with what was seen of them, whichever
+  /// job wrote them.
+  std::vector<Completion> frames;
   std::optional<std::size_t> former;  ///< whose work goes on
   /// Tasks of `former` that count as the new job's, under their keys.
   std::vector<TaskKey> tasks;
@@ -43,7 +48,7 @@ struct Adoption {
   /// Frames that were written and are not there.
   std::vector<FrameIndex> lost;
 
-  bool empty() const { return images.empty() && tasks.empty() && plan.cuts.empty(); }
+  bool empty() const { return frames.empty() && tasks.empty() && plan.cuts.empty(); }
 };
 
 /// Whether frames are written alike: in the same channels, format and names. What stands in headers

@@ -190,6 +190,14 @@ struct LeaseReturned {
   LeaseId lease;
   std::string unseen = {};
 };
+/// A picture stands in the place of the frame that the task would write, and the worker has left it
+/// there. stays: it is nobody's here, so the frame counts as written, by nobody; else the task is
+/// given back.
+struct PlaceTaken {
+  std::string worker;
+  LeaseId lease;
+  bool stays = true;
+};
 /// What an attempt put into the store that has no result, or whose lease is over.
 struct AttemptLeft {
   LeaseId lease;
@@ -206,7 +214,7 @@ using Event =
     std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, FramesInspected,
                  FramesLocked, JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested,
                  TaskCompleted, AttemptFailed, ResultMissing, SpaceLacking, InputsLost,
-                 LeaseReturned, HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
+                 LeaseReturned, PlaceTaken, HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed

@@ -38,6 +38,13 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
     book_.add_input(graph_, dependent);
 }
 
+Completion JobTasks::leave_frame(TaskIndex task, BlobReferences& blobs) {
+  const TaskKey key = graph_.key(task);
+  Completion completion{key, {{BlobRef::any_image(key.frame())}}};
+  complete(task, completion, made_.stranger(), /*is_shared=*/true, blobs);
+  return completion;
+}
+
 /// Brings a task to done, along the legal way, and enters what it made.
 void JobTasks::force_done(TaskIndex task, const std::vector<BlobRef>& outputs) {
   book_.apply(graph_, task, TaskEvent::inputs_done);

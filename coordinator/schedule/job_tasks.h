@@ -59,6 +59,9 @@ class JobTasks {
   /// may read its state.
   void complete(TaskIndex task, const Completion& completion, const std::string& worker,
                 bool is_shared, BlobReferences& blobs);
+  /// Ends an open assembly, which is not leased to anybody: its frame counts as made, whatever is
+  /// in the file.
+  Completion leave_frame(TaskIndex task, BlobReferences& blobs);
   /// A state that the worker holds is in the store now. nullopt: it does not hold it; else the task
   /// that made it.
   std::optional<TaskIndex> publish(const PublishedState& state, const std::string& worker,

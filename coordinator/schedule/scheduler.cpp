@@ -148,11 +148,8 @@ void Scheduler::on(const FramesLocked& event, TimePoint, Actions& actions) {
     const std::optional<TaskIndex> task = job->tasks.graph().find(assemble_task(frame));
     if (!task) continue;
     const TaskStatus status = job->tasks.book().status(*task);
-    if (status != TaskStatus::blocked && status != TaskStatus::ready) continue;
-    Completion completion{assemble_task(frame), {{BlobRef::any_image(frame)}}};
-    job->tasks.complete(*task, completion, job->tasks.made().stranger(), /*is_shared=*/true,
-                        blobs_);
-    actions.push_back(RecordCompletion{event.job, std::move(completion)});
+    if (status == TaskStatus::blocked || status == TaskStatus::ready)
+      actions.push_back(RecordCompletion{event.job, job->tasks.leave_frame(*task, blobs_)});
   }
   end_if_finished(event.job, *job, actions);
 }
@@ -221,13 +218,14 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
 }
 
 /// Two different results for one task are a bug or a broken machine: the job pauses, so that
-/// somebody looks before more is made of them. Of a held state only its task is known. Returns
-/// whether they are equal.
+/// somebody looks before more is made of them. Of a placeholder no bytes are known. Returns whether
+/// they are equal.
 bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
                                 const std::vector<BlobRef>& reported, Actions& actions) {
-  const auto [e, r] = std::mismatch(
-      expected.begin(), expected.end(), reported.begin(), reported.end(),
-      [](const BlobRef& a, const BlobRef& b) { return a.is_held() || b.is_held() || a == b; });
+  const auto [e, r] = std::mismatch(expected.begin(), expected.end(), reported.begin(),
+                                    reported.end(), [](const BlobRef& a, const BlobRef& b) {
+                                      return a.is_placeholder() || b.is_placeholder() || a == b;
+                                    });
   if (e == expected.end() || r == reported.end()) return true;
   const Digest digest = event.lease.job;
   Job& job = jobs_.at(digest);
@@ -276,6 +274,21 @@ void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions& actions) 
   if (claim.job)
     return_lease(claim, event.lease,
                  event.unseen.empty() ? "no time left" : "does not see " + event.unseen, actions);
+}
+
+void Scheduler::on(const PlaceTaken& event, TimePoint now, Actions& actions) {
+  if (!leases_.touch(event.worker, now)) return;
+  const Claim claim = find_claim(event.worker, event.lease, now);
+  if (!claim.job) return;
+  if (!event.stays) {
+    return_lease(claim, event.lease, "a picture in its frame's place may be replaced", actions);
+    return;
+  }
+  end_lease(event.lease.job, claim.task, LeaseEnd::returned, "another picture is in its place",
+            actions);
+  actions.push_back(
+      RecordCompletion{event.lease.job, claim.job->tasks.leave_frame(claim.task, blobs_)});
+  end_if_finished(event.lease.job, *claim.job, actions);
 }
 
 void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {

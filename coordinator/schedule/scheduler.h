@@ -131,6 +131,7 @@ class Scheduler {
   void on(const InputsLost& event, TimePoint now, Actions& actions);
   void on(const HeldPublished& event, TimePoint now, Actions& actions);
   void on(const LeaseReturned& event, TimePoint now, Actions& actions);
+  void on(const PlaceTaken& event, TimePoint now, Actions& actions);
   void on(const AttemptLeft& event, TimePoint now, Actions& actions);
   void on(const StoreKeeps& event, TimePoint now, Actions& actions);
   void on(const ClockTicked& event, TimePoint now, Actions& actions);

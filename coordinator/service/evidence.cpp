@@ -65,6 +65,8 @@ std::optional<std::string> find_hindrance(const FarmCore& farm, const LeaseId& l
   const fs::path frame = is_frame ? frame_path(job->spec, lease.task.frame()) : fs::path();
   if (is_frame && fs::is_directory(frame, error))
     return "a frame's place: " + frame.string() + " is a folder";
+  if (is_frame && ::access(frame.c_str(), R_OK) != 0 && errno != ENOENT && errno != ENOTDIR)
+    return "a frame's place: what is in " + frame.string() + " cannot be read";
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   if (::access(folder.c_str(), W_OK) == 0 || errno != EROFS) return std::nullopt;
   return "a folder that can be written";

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "common/base/archive.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 #include "common/store/folder_token.h"
 #include "coordinator/service/diagnostics_file.h"
 #include "coordinator/service/job_report.h"
@@ -204,7 +206,10 @@ Status FarmCore::perform(const RecordJobStatus& action) {
   // Workers that have its document from before do not ask for it again.
   if (action.status == JobStatus::running && !marked_.contains(action.job))
     BATON_TRY(mark_output(action.job));
-  if (!is_open(action.status)) ended_.push_back(action.job);
+  if (!is_open(action.status)) {
+    ended_.push_back(action.job);
+    records_.erase(action.job);
+  }
   return journal.record_status(action.job, action.status);
 }
 
@@ -218,7 +223,10 @@ Status FarmCore::perform(const InspectFrames& action) {
 }
 
 Status FarmCore::perform(const GrantLease& action) {
-  const Grant& grant = action;
+  Grant grant = action;
+  if (grant.lease.task.kind == TaskKind::assemble) {
+    BATON_ASSIGN(grant.may_replace, replaceable(grant.lease));
+  }
   BATON_TRY(history.granted(*scheduler.find_job(grant.lease.job), grant.lease, action.worker));
   return reply_to(action.worker, grant);
 }
@@ -260,6 +268,41 @@ Status FarmCore::perform(const RemoveBlobs& action) {
   return {};
 }
 
+// ---- what stands in the places of frames --------------------------------------------------------
+
+Result<FolderRecord*> FarmCore::record_of(const Digest& job, const JobSpec& spec) {
+  const auto known = records_.find(job);
+  if (known != records_.end()) return &known->second;
+  BATON_ASSIGN(FolderRecord record, FolderRecord::read(journal, folder_of(spec), job));
+  return &records_.emplace(job, std::move(record)).first->second;
+}
+
+/// Of an assembly of a job that the scheduler has; none where nothing is in the frame's place.
+Result<std::vector<Digest>> FarmCore::replaceable(const LeaseId& lease) {
+  const JobSpec& spec = scheduler.find_job(lease.job)->spec;
+  const fs::path path = frame_path(spec, lease.task.frame());
+  const Result<std::optional<FileStamp>> stamp = stamp_of(path);
+  if (stamp && !*stamp) return std::vector<Digest>();
+  BATON_ASSIGN(FolderRecord* const record, record_of(lease.job, spec));
+  return record->replaceable(path);
+}
+
+Result<bool> FarmCore::may_replace(const Digest& job, const JobSpec& spec, const fs::path& path,
+                                   const FileVerdict& picture) {
+  records_.erase(job);
+  BATON_ASSIGN(FolderRecord* const record, record_of(job, spec));
+  if (!record->may_replace(path, picture)) return false;
+  record->give_up(path, picture.digest);
+  return true;
+}
+
+Status FarmCore::give_up(const Digest& job, const std::vector<FramesInDoubt::Frame>& frames) {
+  records_.erase(job);
+  for (const FramesInDoubt::Frame& frame : frames)
+    BATON_TRY(journal.record_given_up(frame.file, frame.digest));
+  return {};
+}
+
 // ---- marks of folders ---------------------------------------------------------------------------
 
 void FarmCore::keep_token() const {
@@ -279,10 +322,12 @@ Result<std::string> FarmCore::mark_output(const Digest& job) {
   const Scheduler::Job* const open = scheduler.find_job(job);
   if (open == nullptr || !is_open(open->status)) return std::string();
   const fs::path file = output_token_file(open->spec.output.directory, job);
-  if (marked_.contains(job) && (lost_mark(job, open->spec) || expect_token(file, token)))
+  const std::string frames = format_frames(locked(job, open->spec).numbers(open->spec));
+  const Result<std::string> there = read_after_token(file, token);
+  if (marked_.contains(job) && (lost_mark(job, open->spec) || (there && *there == frames)))
     return token;
   if (!check_output_root(open->spec, options.roots)) return std::string();
-  if (!write_token(file, token)) return std::string();
+  if (!write_token(file, token, frames)) return std::string();
   marked_.insert(job);
   BATON_TRY(journal.record_output_mark(job, true));
   return token;

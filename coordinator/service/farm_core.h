@@ -14,6 +14,7 @@
 #include "coordinator/journal/journal.h"
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/service/file_reader.h"
+#include "coordinator/service/folder_record.h"
 #include "coordinator/service/history.h"
 #include "coordinator/service/locked_frames.h"
 #include "coordinator/service/peers.h"
@@ -68,7 +69,7 @@ class FarmCore {
 
   /// Frames of a version that count as done.
   LockedFrames locked(const Digest& version, const JobSpec& spec) const {
-    return {spec, history.jobs().of(version).locked};
+    return {spec, history.jobs().locked(history.jobs().of(version).id)};
   }
   /// Something happens; what follows is journalled, sent or noted for the end of the turn.
   Status step(const Event& event);
@@ -107,6 +108,12 @@ class FarmCore {
   /// Why the output folder of an open job is not the one that was marked, with its name; nullopt:
   /// it is, none was, or the disk does not say now.
   std::optional<std::string> lost_mark(const Digest& job, const JobSpec& spec) const;
+  /// Whether an open job may replace a picture that was found in the place of a frame. Then leases
+  /// of it say so from now on.
+  Result<bool> may_replace(const Digest& job, const JobSpec& spec,
+                           const std::filesystem::path& path, const FileVerdict& picture);
+  /// A person has said that the job may replace these.
+  Status give_up(const Digest& job, const std::vector<FramesInDoubt::Frame>& frames);
   /// Takes up the marks of a coordinator before this one.
   Status take_up_marks();
   /// The document for replays outlives its job only if that has failed.
@@ -144,6 +151,9 @@ class FarmCore {
   Status perform(const ReportConflict& action);
   Status perform(const RemoveBlobs& action);
 
+  Result<FolderRecord*> record_of(const Digest& job, const JobSpec& spec);
+  Result<std::vector<Digest>> replaceable(const LeaseId& lease);
+
   struct Outgoing {
     PeerId peer;
     Message message;
@@ -156,6 +166,7 @@ class FarmCore {
   std::vector<Digest> ended_;                         ///< jobs to be archived
   std::set<Digest> marked_;                           ///< open jobs whose output folder is marked
   std::map<Digest, std::filesystem::path> unmarked_;  ///< marks that go after the commit
+  std::map<Digest, FolderRecord> records_;            ///< of folders of open jobs, once asked for
   /// That the archive keeps, as the scheduler was told.
   std::uint64_t kept_bytes_ = 0;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -10,7 +11,7 @@ namespace baton {
 void raise_file_limit();
 
 /// Why no more workers are taken: the descriptors that are left are for clients, the journal and
-/// files. nullopt: there is room.
-std::optional<std::string> lack_of_descriptors();
+/// files. nullopt: there is room, or nobody can say. list: a folder of those that are open.
+std::optional<std::string> lack_of_descriptors(const std::filesystem::path& list = "/proc/self/fd");
 
 }  // namespace baton

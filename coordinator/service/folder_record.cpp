@@ -13,18 +13,21 @@ namespace baton {
 
 namespace fs = std::filesystem;
 
-Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& folder) {
+Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& folder,
+                                        const Digest& job) {
   FolderRecord record;
+  record.jobs_.push_back(job);
+  BATON_ASSIGN(record.given_up_, journal.given_up());
   BATON_ASSIGN(const std::vector<Digest> jobs, journal.jobs_in(folder));
-  for (const Digest& job : jobs) {
-    BATON_ASSIGN(const std::optional<std::string> text, journal.document(job));
+  for (const Digest& other : jobs) {
+    BATON_ASSIGN(const std::optional<std::string> text, journal.document(other));
     const Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
     if (!document) continue;
-    record.jobs_.push_back(job);
-    BATON_TRY(journal.for_each_completion(job, [&](const Completion& done) -> Status {
+    record.jobs_.push_back(other);
+    BATON_TRY(journal.for_each_completion(other, [&](const Completion& done) -> Status {
       if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
       const fs::path path = frame_path(document->job, done.task.frame()).lexically_normal();
-      record.images_[path].push_back({job, done.made.outputs.front()});
+      record.images_[path].push_back({other, done.made.outputs.front()});
       return {};
     }));
   }
@@ -39,7 +42,9 @@ std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
   return recorded;
 }
 
-bool FolderRecord::has_written(const fs::path& path, const FileVerdict& picture) const {
+bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture) const {
+  const auto given_up = given_up_.find(path.lexically_normal());
+  if (given_up != given_up_.end() && given_up->second == picture.digest) return true;
   const auto found = images_.find(path.lexically_normal());
   const std::span<const Image> images =
       found == images_.end() ? std::span<const Image>() : std::span(found->second);
@@ -52,8 +57,24 @@ bool FolderRecord::has_written(const fs::path& path, const FileVerdict& picture)
          std::ranges::none_of(images, [&](const Image& image) { return image.job == *writer; });
 }
 
-OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const Digest& job,
-                          const JobSpec& spec, const LockedFrames& locked) {
+std::vector<Digest> FolderRecord::replaceable(const fs::path& path) const {
+  std::vector<Digest> digests;
+  if (const auto given_up = given_up_.find(path.lexically_normal()); given_up != given_up_.end())
+    digests.push_back(given_up->second);
+  const std::vector<BlobRef> images = images_of(path);
+  for (auto image = images.rbegin(); image != images.rend() && digests.size() < kMostTold;
+       ++image) {
+    if (!image->is_placeholder()) digests.push_back(image->digest);
+  }
+  return digests;
+}
+
+void FolderRecord::give_up(const fs::path& path, const Digest& picture) {
+  given_up_[path.lexically_normal()] = picture;
+}
+
+OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& spec,
+                          const LockedFrames& locked) {
   OddFrames odd;
   BlobRef nothing;
   nothing.kind = BlobKind::image;
@@ -80,9 +101,8 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
       odd.unread.push_back(std::move(file));
     } else if (verdict.state == FileState::unreadable) {
       odd.unreadable = verdict.fault;
-    } else if (verdict.state == FileState::strange && verdict.writer != job.hex() &&
-               !record.has_written(path, verdict)) {
-      odd.doubt.strange.push_back({path.string(), number});
+    } else if (verdict.state == FileState::strange && !record.may_replace(path, verdict)) {
+      odd.doubt.strange.push_back({path.string(), number, verdict.digest});
     }
   }
   return odd;

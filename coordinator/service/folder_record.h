@@ -17,21 +17,26 @@ namespace baton {
 /// What the journal has of the frames in a folder, by whichever of its jobs.
 class FolderRecord {
  public:
-  /// folder: folder_of() a job.
-  static Result<FolderRecord> read(Journal& journal, const std::string& folder);
+  /// folder: folder_of() `job`, the digest of a document that the journal may not have yet.
+  static Result<FolderRecord> read(Journal& journal, const std::string& folder, const Digest& job);
 
   /// What the file of a frame may be, as far as it is recorded.
   std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
-  /// Whether a picture in the place of a frame is a job's of this folder: one that is recorded, or
-  /// one that was written and never reported.
-  bool has_written(const std::filesystem::path& path, const FileVerdict& picture) const;
+  /// Whether a picture in the place of a frame may be replaced: a person has given it up, or it is
+  /// a job's of this folder, one that is recorded, or one that was written and never reported.
+  bool may_replace(const std::filesystem::path& path, const FileVerdict& picture) const;
+  /// Those of which only the digest must be known for that: at most kMostTold, the newest of them.
+  std::vector<Digest> replaceable(const std::filesystem::path& path) const;
+  void give_up(const std::filesystem::path& path, const Digest& picture);
 
  private:
   struct Image {
     Digest job;
     BlobRef image;
   };
+  static constexpr std::size_t kMostTold = 256;
   std::map<std::filesystem::path, std::vector<Image>> images_;  ///< by normal path
+  std::map<std::filesystem::path, Digest> given_up_;            ///< likewise
   std::vector<Digest> jobs_;
 };
 
@@ -40,6 +45,7 @@ struct FramesInDoubt {
   struct Frame {
     std::string file;
     FrameNumber number{};
+    Digest digest = {};  ///< of a strange one
   };
   std::vector<Frame> strange;        ///< files that are pictures of nobody here
   std::vector<Frame> locked_absent;  ///< locked, and not there
@@ -57,8 +63,7 @@ struct OddFrames {
   /// Why one of them cannot be read; empty: none is.
   std::string unreadable;
 };
-/// job: the digest of the document of `spec`; what its header names may be written again.
-OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const Digest& job,
-                          const JobSpec& spec, const LockedFrames& locked);
+OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& spec,
+                          const LockedFrames& locked);
 
 }  // namespace baton

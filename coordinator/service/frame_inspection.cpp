@@ -79,12 +79,13 @@ Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
   if (pictures.empty()) return found;
 
   // A worker of a former job may have written late.
-  BATON_ASSIGN(const FolderRecord record, FolderRecord::read(journal, folder_of(job.spec)));
+  BATON_ASSIGN(const FolderRecord record, FolderRecord::read(journal, folder_of(job.spec), {}));
   for (const auto& [path, picture] : pictures) {
-    if (record.has_written(path, picture.second)) {
+    if (record.may_replace(path, picture.second)) {
       lose(picture.first, path);
     } else {
-      found.doubt.strange.push_back({path.string(), number_of(picture.first)});
+      found.doubt.strange.push_back(
+          {path.string(), number_of(picture.first), picture.second.digest});
     }
   }
   return found;

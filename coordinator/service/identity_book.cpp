@@ -26,7 +26,7 @@ JobIdentity IdentityBook::of(const Digest& document) const {
   const auto version = documents_.find(document);
   if (version == documents_.end()) return {};
   const JobId& id = version->second.id;
-  return {id, version->second.number, jobs_.at(id).times, locked(id)};
+  return {id, version->second.number, jobs_.at(id).times};
 }
 
 std::vector<FrameNumber> IdentityBook::locked(const JobId& job) const {

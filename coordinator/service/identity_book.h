@@ -18,7 +18,8 @@ class IdentityBook {
 
   /// An empty ID: the document is no version of any job.
   JobIdentity of(const Digest& document) const;
-  /// JobIdentity::locked of a job; none where it is not known.
+  /// Frames of a job that count as done, whatever is in their files; ascending. None where it is
+  /// not known.
   std::vector<FrameNumber> locked(const JobId& job) const;
   bool is_newest(const Digest& document) const;
   /// Oldest first; none where the job is not known.

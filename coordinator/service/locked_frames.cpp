@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 
 #include "common/base/file_stamp.h"
 #include "common/job/plan/sequence.h"
@@ -17,10 +18,15 @@ LockedFrames::LockedFrames(const JobSpec& spec, const std::vector<FrameNumber>& 
   }
 }
 
+std::vector<FrameNumber> LockedFrames::numbers(const JobSpec& spec) const {
+  std::vector<FrameNumber> numbers;
+  for (const FrameIndex frame : frames_) numbers.push_back(spec.frames[frame.index()]);
+  return numbers;
+}
+
 std::string locked_text(const JobSpec& spec, const LockedFrames& locked) {
   if (locked.frames().empty()) return {};
-  std::vector<FrameNumber> numbers;
-  for (const FrameIndex frame : locked.frames()) numbers.push_back(spec.frames[frame.index()]);
+  const std::vector<FrameNumber> numbers = locked.numbers(spec);
   const bool is_one = numbers.size() == 1;
   return fmt::format("{} {} {} locked and {} as {}", is_one ? "frame" : "frames",
                      format_frames(numbers), is_one ? "is" : "are", is_one ? "stays" : "stay",
@@ -31,13 +37,16 @@ Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
                                                const std::vector<FrameNumber>& frames,
                                                const Scheduler::Job* job) {
   std::vector<FrameIndex> places;
+  std::map<FrameNumber, FrameIndex> known;
+  for (FrameIndex place; place.index() < spec.frames.size(); ++place)
+    known[spec.frames[place.index()]] = place;
   std::vector<FrameNumber> unknown;
   for (const FrameNumber frame : frames) {
-    const auto found = std::ranges::find(spec.frames, frame);
-    if (found == spec.frames.end()) {
+    const auto found = known.find(frame);
+    if (found == known.end()) {
       unknown.push_back(frame);
     } else {
-      places.emplace_back(static_cast<std::int32_t>(found - spec.frames.begin()));
+      places.push_back(found->second);
     }
   }
   if (!unknown.empty()) {
@@ -57,12 +66,13 @@ Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
   return places;
 }
 
-Status expect_locked(const JobIdentity& job, const std::vector<FrameNumber>& frames) {
+Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,
+                     const std::vector<FrameNumber>& frames) {
   std::vector<FrameNumber> others;
-  std::ranges::set_difference(frames, job.locked, std::back_inserter(others));
+  std::ranges::set_difference(frames, locked, std::back_inserter(others));
   if (others.empty()) return {};
   return Error{ErrorKind::bad_input, fmt::format("job {}: frames {} are not locked",
-                                                 job.id.short_hex(), format_frames(others))};
+                                                 job.short_hex(), format_frames(others))};
 }
 
 }  // namespace baton

@@ -16,11 +16,13 @@ namespace baton {
 class LockedFrames {
  public:
   LockedFrames() = default;
-  /// numbers: JobIdentity::locked; those that the document does not have are left out.
+  /// numbers: IdentityBook::locked; those that the document does not have are left out.
   LockedFrames(const JobSpec& spec, const std::vector<FrameNumber>& numbers);
 
   bool contains(FrameIndex frame) const { return frames_.contains(frame); }
   const std::set<FrameIndex>& frames() const { return frames_; }
+  /// Ascending by place.
+  std::vector<FrameNumber> numbers(const JobSpec& spec) const;
 
  private:
   std::set<FrameIndex> frames_;
@@ -35,7 +37,8 @@ std::string locked_text(const JobSpec& spec, const LockedFrames& locked);
 Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
                                                const std::vector<FrameNumber>& frames,
                                                const Scheduler::Job* job);
-/// Error (bad_input): some of these frames are not locked.
-Status expect_locked(const JobIdentity& job, const std::vector<FrameNumber>& frames);
+/// Error (bad_input): some of these frames are not among those that are locked in the job.
+Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,
+                     const std::vector<FrameNumber>& frames);
 
 }  // namespace baton

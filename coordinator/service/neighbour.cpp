@@ -103,7 +103,7 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
     if (!other.first_differing) other.first_differing = wanted.job.frames[its.index()];
   }
   other.differing.assign(differing.begin(), differing.end());
-  other.busy = is_open(status) && shared.empty();
+  other.busy = is_open(status) && other.written.empty();
   const std::map<FrameIndex, FrameIndex> in_both(shared.begin(), shared.end());
   for (FrameIndex frame; frame.index() < theirs.frames.size(); ++frame) {
     if (!in_both.contains(frame) && !images.contains(frame))

@@ -19,7 +19,8 @@ struct Neighbour {
   /// What makes their pixels others; empty: they are the same.
   std::vector<std::string> differing;
   std::optional<FrameNumber> first_differing;
-  bool busy = false;          ///< it is open and shares no frame
+  /// It is open, and no frame says whose picture it is.
+  bool busy = false;
   std::size_t num_there = 0;  ///< frames in common that it has written
   /// Frames that it has not written and the new one does not have.
   std::vector<FrameNumber> left_out = {};

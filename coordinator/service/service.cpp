@@ -88,10 +88,13 @@ Status Service::turn() {
   farm_.history.set_actor({});
   start_inspections();
   if (Clock::now() >= next_tick_) {
+    // Whoever has stood still has heard nobody: before it takes somebody for silent it listens.
+    const bool stood_still = Clock::now() - next_tick_ > farm_.options.heartbeat;
+    has_listened_ = stood_still && !has_listened_;
     next_tick_ = Clock::now() + kTick;
     asked_for_hello_.clear();
     tell_refusals();
-    BATON_TRY(farm_.step(ClockTicked{}));
+    if (!has_listened_) BATON_TRY(farm_.step(ClockTicked{}));
     if (Clock::now() >= next_clean_up_) BATON_TRY(clean_up());
     farm_.retry_removals();
   }
@@ -117,12 +120,12 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   hello.worker_id = farm_.peers.id_for(message);
   const bool is_new = farm_.peers.hello_of(hello.worker_id) == nullptr;
   if (is_new && farm_.peers.num_workers() >= limits::kMaxWorkers) {
-    return farm_.refuse(peer, {ErrorKind::io, fmt::format("the farm is full: {} workers",
-                                                          farm_.peers.num_workers())});
+    return farm_.refuse(peer, {ErrorKind::timeout, fmt::format("the farm is full: {} workers",
+                                                               farm_.peers.num_workers())});
   }
   if (const auto lack = is_new ? lack_of_descriptors() : std::nullopt) {
     tell("workers are refused: " + *lack);
-    return farm_.refuse(peer, {ErrorKind::io, "the farm is full: " + *lack});
+    return farm_.refuse(peer, {ErrorKind::timeout, "the farm is full: " + *lack});
   }
   if (const std::optional<std::string> difference = other_build(hello)) {
     if (!farm_.options.mixed_builds) {
@@ -264,6 +267,7 @@ Status Service::receive_from(const std::string& worker, const LeaseReturn& messa
     std::erase_if(gone, [](const BlobRef& input) { return !input.is_held(); });
     return farm_.step(InputsLost{worker, message.lease, std::move(gone)});
   }
+  if (message.in_place != Digest()) return judge_place(worker, message);
   const std::string unseen = message.unseen.substr(0, limits::kMaxTextLength);
   if (!unseen.empty())
     tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,

@@ -100,6 +100,8 @@ class Service {
   void start_inspections();
   Status end_inspection(const FilesRead& read);
   bool may_pass(const Digest& job);
+  void pass(const Digest& job) { unreadable_.erase(job); }
+  Status judge_place(const std::string& worker, const LeaseReturn& message);
   Result<bool> watch_folder(const Digest& job);
 
   void keep_notes(const TaskDone& report);
@@ -110,6 +112,8 @@ class Service {
   Speaker speaker_;                        ///< who sent the message in hand
   std::map<std::string, TimePoint> told_;  ///< warnings, and when
   TimePoint next_tick_{};
+  /// The last turn came late: it has let those speak who waited.
+  bool has_listened_ = false;
   TimePoint next_clean_up_;
   bool stop_requested_ = false;
   bool has_unread_jobs_ = false;  ///< in the journal
@@ -117,8 +121,11 @@ class Service {
   TimePoint patient_until_{};
   /// Reports whose files are not there yet, and since when.
   std::map<LeaseId, TimePoint> late_;
-  /// Jobs with a frame that is, and since when.
-  std::map<Digest, TimePoint> unreadable_;
+  /// Since when a job has had a frame that cannot be read, and when that was seen last.
+  struct Unreadable {
+    TimePoint since, seen;
+  };
+  std::map<Digest, Unreadable> unreadable_;
   FileTable files_;                   ///< frames, and inputs of failed attempts
   std::unique_ptr<FileWaits> waits_;  ///< made by run()
 };

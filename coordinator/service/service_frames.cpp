@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
+#include "common/job/plan/sequence.h"
 #include "coordinator/service/frame_inspection.h"
 #include "coordinator/service/service.h"
 #include "coordinator/service/submission.h"
@@ -9,8 +12,28 @@ namespace baton {
 namespace {
 
 constexpr std::chrono::milliseconds kInspectAgain{500};
+/// Who waits for a file asks again within this.
+constexpr std::chrono::milliseconds kForgetUnreadable{5000};
 
 }  // namespace
+
+/// A worker has found a whole picture in the place of a frame. What jobs of the folder have left
+/// there it may replace; anybody else's stays, and the end of the job tells of it.
+Status Service::judge_place(const std::string& worker, const LeaseReturn& message) {
+  const LeaseId& lease = message.lease;
+  const Scheduler::Job* const job = farm_.scheduler.find_job(lease.job);
+  const bool is_frame = job != nullptr && lease.task.kind == TaskKind::assemble &&
+                        job->tasks.graph().find(lease.task);
+  if (!is_frame) return farm_.step(LeaseReturned{worker, lease});
+  const std::filesystem::path path = frame_path(job->spec, lease.task.frame());
+  BATON_ASSIGN(const bool may_go,
+               farm_.may_replace(lease.job, job->spec, path,
+                                 {FileState::strange, {}, message.in_place, message.writer}));
+  if (!may_go)
+    tell(fmt::format("job {}: {} is another picture, and stays", farm_.history.name_of(lease.job),
+                     path.string()));
+  return farm_.step(PlaceTaken{worker, lease, !may_go});
+}
 
 /// Remembers how the frame of an accepted report stands: as long as it stands so, it needs no
 /// reading.
@@ -20,6 +43,7 @@ Status Service::keep_frame_file(const TaskDone& report, const ReportedFrame& fra
   if (!task || job->tasks.made().outputs(*task) != report.made.outputs) return {};
   const FileStamp stamp = frame.stamp.value().value();
   files_.add({frame.path, stamp, frame.digest, {}, std::string()});
+  BATON_TRY(farm_.journal.record_given_up(frame.path, std::nullopt));
   return farm_.journal.record_frame_file(report.lease.job,
                                          {report.lease.task.frame(), frame.digest, stamp});
 }
@@ -47,11 +71,16 @@ void Service::start_inspections() {
   });
 }
 
-/// Whether a frame of the job that cannot be read is waited for: not for longer than file_patience.
+/// Whether a frame of the job that cannot be read is waited for: not for longer than file_patience,
+/// since it was last seen to be readable or nobody looked for so long.
 bool Service::may_pass(const Digest& job) {
   const TimePoint now = std::chrono::steady_clock::now();
-  const TimePoint since = unreadable_.try_emplace(job, now).first->second;
-  if (now - since < farm_.options.file_patience) return true;
+  const auto [known, is_new] = unreadable_.try_emplace(job, Unreadable{now, now});
+  Unreadable& frame = known->second;
+  if (now - frame.seen > std::max(farm_.options.file_patience, kForgetUnreadable))
+    frame.since = now;
+  frame.seen = now;
+  if (now - frame.since < farm_.options.file_patience) return true;
   unreadable_.erase(job);
   return false;
 }
@@ -68,7 +97,7 @@ Status Service::end_inspection(const FilesRead& read) {
     farm_.to_inspect.emplace(digest, std::chrono::steady_clock::now() + kInspectAgain);
     return {};
   }
-  unreadable_.erase(digest);
+  pass(digest);
 
   // What is missing in another folder is not gone.
   BATON_ASSIGN(const bool is_elsewhere, found.all_right() ? false : watch_folder(digest));

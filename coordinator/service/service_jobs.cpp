@@ -128,6 +128,8 @@ Status Service::restore_job(const Digest& digest) {
   const JobStatus status = event.status;
   BATON_TRY(farm_.step(std::move(event)));
   if (lacks_mark) BATON_TRY(farm_.mark_output_again(digest));
+  // What is locked stands in the mark; whoever was killed may not have come to that.
+  if (const Result<std::string> marked = farm_.mark_output(digest); !marked) return marked.error();
   if (!is_open(status)) farm_.note_ended(digest);
   farm_.remove_job_file(digest, status);
   const JobProgress progress = farm_.scheduler.find_job(digest)->tasks.progress();
@@ -199,11 +201,11 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   const bool may_replace = message.restart && odd->doubt.locked_absent.empty();
   if (!odd->unreadable.empty() && !may_replace && !runs && may_pass(document->digest))
     return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + odd->unreadable});
-  unreadable_.erase(document->digest);
+  pass(document->digest);
   if (!fault.empty() && !may_replace && !runs)
     return farm_.refuse(peer,
                         {ErrorKind::io, fmt::format("job '{}': {}", document->job.name, fault)});
-  return submission.submit(peer, *document, wanted);
+  return submission.submit(peer, *document, wanted, odd->doubt.strange);
 }
 
 /// The frames that a message about a job would replace or keep. nullopt: some must be read, and the
@@ -214,8 +216,8 @@ Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const
   const TimePoint now = std::chrono::steady_clock::now();
   const Incoming incoming{peer, message, speaker_};
   if (waits_->join(job, incoming, now)) return std::optional<OddFrames>();
-  BATON_ASSIGN(const FolderRecord record, FolderRecord::read(farm_.journal, folder_of(spec)));
-  OddFrames odd = find_odd_frames(record, files_, job, spec, locked);
+  BATON_ASSIGN(const FolderRecord record, FolderRecord::read(farm_.journal, folder_of(spec), job));
+  OddFrames odd = find_odd_frames(record, files_, spec, locked);
   if (odd.unread.empty()) return std::optional(std::move(odd));
   const std::string text = fmt::format("job '{}': looking at {} frames in {}", spec.name,
                                        odd.unread.size(), spec.output.directory);
@@ -329,6 +331,7 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
           peer, {ErrorKind::io, fmt::format("job {} stays paused: {}", farm_.history.name_of(*job),
                                             *lost.unreadable)});
     }
+    pass(*job);
     tell_lost(*job, lost);
     const std::vector<std::string> reasons = lost_reasons(lost);
     BATON_TRY(farm_.step(JobResumed{*job, std::move(lost.tasks)}));
@@ -349,7 +352,8 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   frames.erase(std::ranges::unique(frames).begin(), frames.end());
   std::vector<FrameIndex> places;
   if (message.off) {
-    const Status may = expect_locked(farm_.history.jobs().of(*job), frames);
+    const JobId id = farm_.history.jobs().of(*job).id;
+    const Status may = expect_locked(id, farm_.history.jobs().locked(id), frames);
     if (!may) return farm_.refuse(peer, may.error());
   } else {
     Result<std::vector<FrameIndex>> found =
@@ -361,6 +365,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
+  if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
   return answer_detail(peer, *job);
 }
 
@@ -422,6 +427,7 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
   if (farm_.scheduler.find_job(job) != nullptr) {
     ShownJob shown{farm_.history.jobs().of(job), {}};
     shown.growth = growth.said;
+    shown.locked = farm_.history.jobs().locked(shown.identity.id);
     shown.lacks_renderer =
         farm_.scheduler.leases().nobody_renders_as(farm_.scheduler.find_job(job)->renderer);
     BATON_ASSIGN(shown.detail, farm_.living_detail(job));
@@ -436,8 +442,9 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
                fmt::format("job {}: its document cannot be read", farm_.history.name_of(job))});
   }
   detail->summary.owner = farm_.owner_of(job);
-  return farm_.reply(peer, ShownJob{farm_.history.jobs().of(job), std::move(*detail), false,
-                                    std::move(growth.said)});
+  const JobIdentity identity = farm_.history.jobs().of(job);
+  return farm_.reply(peer, ShownJob{identity, std::move(*detail), false, std::move(growth.said),
+                                    farm_.history.jobs().locked(identity.id)});
 }
 
 }  // namespace baton

@@ -23,16 +23,26 @@ namespace fs = std::filesystem;
 
 // ---- another job of the folder ------------------------------------------------------------------
 
-/// What the journal knows of a job, as far as a later one can use it. nullopt: it cannot be read.
-Result<std::optional<FormerJob>> Submission::former_job(const Digest& digest) {
-  BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(digest));
-  Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
-  if (!document) return std::optional<FormerJob>();
-  BATON_ASSIGN(JournalledJob known, farm_.journal.load(digest));
-  FormerJob former{std::move(document).value(), std::move(known.completions.tasks),
-                   std::move(known.plan), known.status};
-  former.document.job.leading_runs = former.plan.leading_runs;
-  return std::optional(std::move(former));
+/// What the journal knows of the jobs of a folder that can be read, in the order of submission, as
+/// far as a later one can use it.
+Result<std::vector<Submission::InFolder>*> Submission::jobs_in(const std::string& folder) {
+  const auto [entry, is_new] = folders_.try_emplace(folder);
+  if (!is_new) return &entry->second;
+  BATON_ASSIGN(const std::vector<Digest> jobs, farm_.journal.jobs_in(folder));
+  for (const Digest& job : jobs) {
+    BATON_ASSIGN(JournalledJob known, farm_.journal.load(job));
+    Result<ParsedJobDocument> document = parse_job_document(known.document);
+    if (!document) continue;
+    FormerJob former{std::move(document).value(),
+                     std::move(known.completions.tasks),
+                     std::move(known.plan),
+                     known.status,
+                     std::move(known.completions.frames),
+                     std::move(known.renderer)};
+    former.document.job.leading_runs = former.plan.leading_runs;
+    entry->second.push_back({job, std::move(former)});
+  }
+  return &entry->second;
 }
 
 /// The one that had the document before, else the one of its name that the same speaker has in its
@@ -55,20 +65,18 @@ Result<JobId> Submission::known_job(const ParsedJobDocument& document) {
 Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocument& document,
                                                            const JobId& job, bool restart) {
   std::vector<Neighbour> others;
-  BATON_ASSIGN(const std::vector<Digest> neighbours,
-               farm_.journal.jobs_in(folder_of(document.job)));
-  for (const Digest& digest : neighbours) {
+  BATON_ASSIGN(const auto* neighbours, jobs_in(folder_of(document.job)));
+  for (const auto& [digest, former] : *neighbours) {
     if (digest == document.digest) continue;
-    BATON_ASSIGN(const std::optional<FormerJob> former, former_job(digest));
-    if (!former) continue;
     BATON_ASSIGN(const std::optional<JobDetail> ended, farm_.archived_detail(digest));
     const JobIdentity who = farm_.history.jobs().of(digest);
     const bool is_former_version = who.id == job;
-    const Locks locks{
-        is_former_version ? LockedFrames() : LockedFrames(former->document.job, who.locked),
-        LockedFrames(document.job, farm_.history.jobs().locked(job))};
+    const Locks locks{is_former_version
+                          ? LockedFrames()
+                          : LockedFrames(former.document.job, farm_.history.jobs().locked(who.id)),
+                      LockedFrames(document.job, farm_.history.jobs().locked(job))};
     Neighbour other =
-        look_at(*former, digest, document, files_, ended ? &ended->frames_done : nullptr, locks);
+        look_at(former, digest, document, files_, ended ? &ended->frames_done : nullptr, locks);
     if (!other.locked.empty())
       return locked_elsewhere(document.job, other, farm_.history.name_of(digest));
     if (other.busy && !restart && !is_former_version) {
@@ -76,13 +84,13 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
           ErrorKind::bad_input,
           fmt::format("job '{}': job {} ('{}', {}) writes into {}: wait for its end, cancel "
                       "it, or choose another output.directory",
-                      document.job.name, farm_.history.name_of(digest), former->document.job.name,
+                      document.job.name, farm_.history.name_of(digest), former.document.job.name,
                       job_status_name(other.status), document.job.output.directory)};
     }
     if (!other.differing.empty() && !restart)
-      return another_picture(document.job, other, former->document.job,
+      return another_picture(document.job, other, former.document.job,
                              farm_.history.name_of(digest));
-    if (other.written.empty() && !is_open(other.status)) continue;
+    if (other.written.empty() && !other.busy) continue;
     if (is_open(other.status) || !other.differing.empty())
       BATON_TRY(farm_.check_own(speaker_, digest));
     others.push_back(std::move(other));
@@ -137,19 +145,28 @@ Status Submission::disown(const Digest& job, const std::vector<FrameNumber>& fra
 
 // ---- jobs that grow -----------------------------------------------------------------------------
 
-/// Sweeps of the frames that jobs of the picture have written in the folder; 0: there are none.
-Result<int> Submission::written_sweeps(const ParsedJobDocument& document) {
-  int sweeps = 0;
-  BATON_ASSIGN(const std::vector<Digest> neighbours,
-               farm_.journal.jobs_in(folder_of(document.job)));
-  for (const Digest& digest : neighbours) {
-    BATON_ASSIGN(const std::optional<FormerJob> former, former_job(digest));
-    if (!former || former->document.picture != document.picture) continue;
-    const bool has_frames = std::ranges::any_of(former->tasks, [](const Completions::Task& task) {
-      return task.task.kind == TaskKind::assemble && !task.outputs.empty() &&
-             !task.outputs.front().is_any_image();
-    });
-    if (has_frames) sweeps = std::max(sweeps, former->document.job.quality.sweeps);
+/// A frame that is not there, or is locked and nobody's, has none.
+Result<Submission::WrittenSweeps> Submission::written_sweeps(const ParsedJobDocument& document) {
+  std::map<FrameNumber, int> of_frames;
+  for (const FrameNumber frame : document.job.frames) of_frames[frame] = 0;
+  BATON_ASSIGN(const auto* neighbours, jobs_in(folder_of(document.job)));
+  for (const auto& [digest, former] : *neighbours) {
+    if (former.document.picture != document.picture) continue;
+    const JobSpec& job = former.document.job;
+    for (const Completions::Task& task : former.tasks) {
+      if (task.task.kind != TaskKind::assemble || task.outputs.size() != 1) continue;
+      const auto frame = of_frames.find(job.frames.at(task.task.frame().index()));
+      const bool has_more = frame != of_frames.end() && job.quality.sweeps > frame->second;
+      if (!has_more || task.outputs.front().is_placeholder()) continue;
+      const FileState state =
+          files_.judge(frame_path(job, task.task.frame()), task.outputs.front()).state;
+      if (state != FileState::absent) frame->second = job.quality.sweeps;
+    }
+  }
+  WrittenSweeps sweeps{0, document.job.frames.empty() ? 0 : of_frames.begin()->second};
+  for (const auto& [frame, count] : of_frames) {
+    sweeps.most = std::max(sweeps.most, count);
+    sweeps.common = std::min(sweeps.common, count);
   }
   return sweeps;
 }
@@ -160,7 +177,8 @@ Result<std::string> Submission::with_written_sweeps(const ParsedJobDocument& doc
   if (!quality.may_grow()) return text;
   int sweeps = 0;
   if (!restart) {
-    BATON_ASSIGN(sweeps, written_sweeps(document));
+    BATON_ASSIGN(const WrittenSweeps written, written_sweeps(document));
+    sweeps = written.most;
     // What it has decided to add it goes on with.
     BATON_ASSIGN(const JobId id, known_job(document));
     const std::vector<Digest> versions = farm_.history.jobs().versions(id);
@@ -176,12 +194,14 @@ Result<std::string> Submission::with_written_sweeps(const ParsedJobDocument& doc
   return with_sweeps(document, std::max(sweeps, quality.sweeps));
 }
 
-/// A person submits it: its time and the number of its sweeps count from now on.
+/// A person submits it: its time and the number of its sweeps count from now on. What was decided
+/// before is forgotten.
 Status Submission::begin_growth(const ParsedJobDocument& document, bool restart) {
-  if (!document.job.quality.may_grow()) return {};
-  BATON_ASSIGN(const int written, restart ? Result<int>(0) : written_sweeps(document));
-  return farm_.journal.record_growth(farm_.history.jobs().of(document.digest).id,
-                                     {now_ms(), written, {}});
+  const JobId id = farm_.history.jobs().of(document.digest).id;
+  if (!document.job.quality.may_grow()) return farm_.journal.record_growth(id, {});
+  BATON_ASSIGN(const WrittenSweeps written,
+               restart ? Result<WrittenSweeps>(WrittenSweeps()) : written_sweeps(document));
+  return farm_.journal.record_growth(id, {now_ms(), written.common, {}});
 }
 
 /// Whether a job of which all frames are there gets more sweeps, which are a new version of it.
@@ -246,7 +266,8 @@ Status Submission::add_sweeps(const Digest& version, int sweeps, const std::stri
 // ---- submission ---------------------------------------------------------------------------------
 
 Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
-                          const SubmitJob& message) {
+                          const SubmitJob& message,
+                          const std::vector<FramesInDoubt::Frame>& strange) {
   const Scheduler::Job* const known = farm_.scheduler.find_job(document.digest);
   if (known == nullptr || known->status != JobStatus::running) {
     const bool is_new = farm_.history.jobs().of(document.digest).id.empty();
@@ -260,6 +281,7 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     BATON_TRY(farm_.step(JobSuperseded{document.digest, {}}));
     BATON_TRY(farm_.archive_job(document.digest));
   } else if (known != nullptr) {
+    if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
     BATON_TRY(begin_growth(document, message.restart));
     return go_on(peer, document.digest, message.restart);
   }
@@ -277,6 +299,7 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return others.error();
     return farm_.refuse(peer, others.error());
   }
+  if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
   BATON_TRY(farm_.history.submitted(document.digest, id, message.restart ? "restart" : ""));
   BATON_TRY(begin_growth(document, message.restart));
   BATON_ASSIGN(std::vector<std::string> reasons, make_way(document, *others));
@@ -342,21 +365,19 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
                                                        bool restart, const LockedFrames& locked,
                                                        std::vector<std::string>& reasons) {
   Heritage heritage;
-  BATON_ASSIGN(const std::vector<Digest> neighbours,
-               farm_.journal.jobs_in(folder_of(document.job)));
+  BATON_ASSIGN(const auto* neighbours, jobs_in(folder_of(document.job)));
   std::vector<FormerJob> formers;
-  for (const Digest& digest : neighbours) {
-    BATON_ASSIGN(std::optional<FormerJob> former, former_job(digest));
-    if (!former || !(former->document.picture == document.picture)) continue;
-    BATON_ASSIGN(const JournalledJob known, farm_.journal.load(digest));
-    if (restart && farm_.scheduler.leases().nobody_renders_as(known.renderer)) {
-      reasons.push_back("nothing is kept that was rendered with " + known.renderer);
+  for (auto& [digest, former] : *neighbours) {
+    if (!(former.document.picture == document.picture)) continue;
+    if (restart && farm_.scheduler.leases().nobody_renders_as(former.renderer)) {
+      reasons.push_back("nothing is kept that was rendered with " + former.renderer);
       continue;
     }
-    if (!known.renderer.empty()) heritage.renderer = known.renderer;
-    formers.push_back(std::move(*former));
+    if (!former.renderer.empty()) heritage.renderer = former.renderer;
+    formers.push_back(std::move(former));
     heritage.formers.push_back(digest);
   }
+  folders_.clear();
   const KeptFiles kept{
       .has_frame =
           [&](FrameIndex frame, const BlobRef& image) {
@@ -378,7 +399,7 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   }
   if (adoption.lost.size() > kMost)
     reasons.push_back(fmt::format("and {} frames more", adoption.lost.size() - kMost));
-  if (!adoption.former && adoption.images.empty()) heritage.renderer.clear();
+  if (!adoption.former && adoption.frames.empty()) heritage.renderer.clear();
   return heritage;
 }
 
@@ -386,10 +407,10 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
 /// document; empty: the journal has it.
 Status Submission::take_over(const Heritage& heritage, const std::string& text, JobAdded& event) {
   const Adoption& adoption = heritage.adoption;
-  // Read before the journal changes, since the job may go on from itself. A kept frame has the
-  // statistics of its assembly if that is the former job's.
-  std::map<FrameIndex, BlobRef> images;
-  for (const BlobRef& image : adoption.images) images[image.frame()] = image;
+  // Read before the journal changes, since the job may go on from itself. What the assembly of a
+  // kept frame counted is the job's, too, if it is a task of the former one.
+  std::map<TaskKey, Completion> kept;
+  for (const Completion& frame : adoption.frames) kept.emplace(frame.task, frame);
   const std::set<TaskKey> tasks(adoption.tasks.begin(), adoption.tasks.end());
   const std::set<FrameIndex> lost(adoption.lost.begin(), adoption.lost.end());
   std::vector<Completion> taken;
@@ -398,19 +419,18 @@ Status Submission::take_over(const Heritage& heritage, const std::string& text, 
     BATON_TRY(
         farm_.journal.for_each_completion(former, [&](const Completion& completion) -> Status {
           const bool is_assembly = completion.task.kind == TaskKind::assemble;
-          const auto image = is_assembly ? images.find(completion.task.frame()) : images.end();
-          const bool is_frame = image != images.end() && completion.made.outputs.size() == 1 &&
-                                completion.made.outputs.front() == image->second;
-          if (is_frame) images.erase(image);
+          const auto frame = kept.find(completion.task);
+          if (frame != kept.end() && frame->second.made.outputs == completion.made.outputs)
+            frame->second.made.stats = completion.made.stats;
           // A frame that the job itself wrote and that is gone must come out as it was.
           const bool is_lost =
               former == event.job && is_assembly && lost.contains(completion.task.frame());
           if (is_lost) event.lost.push_back(completion.task);
-          if (is_frame || is_lost || tasks.contains(completion.task)) taken.push_back(completion);
+          if (is_lost || tasks.contains(completion.task)) taken.push_back(completion);
           return {};
         }));
   }
-  for (const auto& [frame, image] : images) taken.push_back({assemble_task(frame), {{image}}});
+  for (auto& [task, frame] : kept) taken.push_back(std::move(frame));
   for (const TaskKey& task : adoption.skipped) taken.push_back({task, {}});
 
   if (text.empty()) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "coordinator/schedule/adoption.h"
 #include "coordinator/service/farm_core.h"
 #include "coordinator/service/file_table.h"
+#include "coordinator/service/folder_record.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/neighbour.h"
 
@@ -22,8 +24,10 @@ class Submission {
       : farm_(farm), files_(files), speaker_(speaker) {}
 
   /// Starts the job or lets it go on, and answers. The document is one that may be run, and its
-  /// frames are known, as far as jobs of its folder have recorded them (find_odd_frames).
-  Status submit(const PeerId& peer, const ParsedJobDocument& document, const SubmitJob& message);
+  /// frames are known, as far as jobs of its folder have recorded them (find_odd_frames). strange:
+  /// pictures of others in their places; there are some only where message.restart gives them up.
+  Status submit(const PeerId& peer, const ParsedJobDocument& document, const SubmitJob& message,
+                const std::vector<FramesInDoubt::Frame>& strange);
   /// The job that the document is a version of, or becomes one; empty: a new one.
   Result<JobId> known_job(const ParsedJobDocument& document);
   /// A document of a job that may grow gets the sweeps that jobs of its picture have written in its
@@ -38,12 +42,22 @@ class Submission {
   Result<LostFiles> lost_files_of(const Digest& job, bool restart = false);
 
  private:
-  Result<std::optional<FormerJob>> former_job(const Digest& digest);
+  /// A job of a folder, and what the journal has of it.
+  struct InFolder {
+    Digest job;
+    FormerJob former;
+  };
+  Result<std::vector<InFolder>*> jobs_in(const std::string& folder);
   Result<std::vector<Neighbour>> find_neighbours(const ParsedJobDocument& document,
                                                  const JobId& job, bool restart);
   Result<std::vector<std::string>> make_way(const ParsedJobDocument& document,
                                             const std::vector<Neighbour>& others);
-  Result<int> written_sweeps(const ParsedJobDocument& document);
+  /// Sweeps that frames of the document have in its folder, by jobs of its picture.
+  struct WrittenSweeps {
+    int most = 0;    ///< of some frame; 0: none is there
+    int common = 0;  ///< that all frames have
+  };
+  Result<WrittenSweeps> written_sweeps(const ParsedJobDocument& document);
   Result<bool> grow(const Digest& version);
   Status begin_growth(const ParsedJobDocument& document, bool restart);
   Status add_sweeps(const Digest& version, int sweeps, const std::string& reason);
@@ -64,6 +78,8 @@ class Submission {
   FarmCore& farm_;
   FileTable& files_;
   const Speaker& speaker_;
+  /// Read once: a submission changes nothing of what former jobs have done.
+  std::map<std::string, std::vector<InFolder>> folders_;
 };
 
 }  // namespace baton

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <span>
+#include <utility>
 
 #include "common/job/plan/frame_judgement.h"
 #include "jobs/cli/text.h"
@@ -215,6 +217,12 @@ ordered_json place_json(const TaskPlace& place) {
           {"attempt", place.attempt}};
 }
 
+std::vector<std::string> fresh_growth(const ShownJob& job, std::size_t& num_told) {
+  const std::size_t num_all = job.growth.size();
+  const std::size_t first = std::min(std::exchange(num_told, num_all), num_all);
+  return {job.growth.begin() + static_cast<std::ptrdiff_t>(first), job.growth.end()};
+}
+
 std::string worker_lines(const WorkerSummary& worker) {
   std::string text = fmt::format("{:<24}  {:>3} threads  {:>3} leases  process {} on {}{}",
                                  worker.worker_id, worker.num_threads, worker.tasks.size(),
@@ -286,7 +294,7 @@ ordered_json detail_json(const ShownJob& job) {
   for (const FrameNumber frame : detail.frames_done)
     result["framesDoneNumbers"].push_back(frame.value());
   result["locked"] = ordered_json::array();
-  for (const FrameNumber frame : job.identity.locked) result["locked"].push_back(frame.value());
+  for (const FrameNumber frame : job.locked) result["locked"].push_back(frame.value());
   if (!detail.waits.empty()) result["waits"] = detail.waits;
   result["judgement"] = judgement_json(detail.frames);
   result["frames"] = ordered_json::array();

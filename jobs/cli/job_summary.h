@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "common/base/exit_codes.h"
 #include "common/protocol/messages.h"
@@ -28,6 +29,10 @@ std::string job_statistics(const JobSummary& job);
 
 /// What is to be known of the frames that are written, several lines; empty: none is.
 std::string judgement_text(const JobDetail& detail);
+
+/// What a growing job has decided beyond the first `num_told` times, which are all then. A job that
+/// was submitted again begins anew.
+std::vector<std::string> fresh_growth(const ShownJob& job, std::size_t& num_told);
 
 /// The worker's line in a list, and one for each task that it has.
 std::string worker_lines(const WorkerSummary& worker);

@@ -5,8 +5,9 @@
 // of this type (a double comes after MS milliseconds, a delayed one then only); "NUMBER none"
 // forgets a command that has not struck. It ends when the input does.
 //
-// RECORD is what a witness saw, one line each: "MS struck NUMBER"; "MS WORKER back SILENCE_MS" when
-// a worker speaks after seconds of silence; and for each lease that a message is about, before it
+// RECORD is what a witness saw, one line each: "MS struck NUMBER", once more when a message goes on
+// late; "MS WORKER back SILENCE_MS" when a worker speaks after seconds of silence; "MS WORKER epoch
+// EPOCH" of each welcome; and for each lease that a message is about, before it
 // is struck, "MS WORKER TYPE JOB KIND STEP TILE ATTEMPT EPOCH [OUTPUT...]", where OUTPUT is
 // KIND:FRAME:DIGEST; kinds are numbers. MS: of a clock that only goes forward.
 #include <fcntl.h>
@@ -132,6 +133,7 @@ class Proxy {
   struct Late {
     Clock::time_point due;
     Passing message;
+    int number = 0;  ///< of the command
   };
 
   void turn() {
@@ -161,6 +163,7 @@ class Proxy {
         ++late;
         continue;
       }
+      fmt::print(record_, "{} struck {}\n", now_ms(), late->number);
       send(late->message);
       late = late_.erase(late);
     }
@@ -181,6 +184,8 @@ class Proxy {
   void pass(Passing message, int worker) {
     const Result<Message> decoded = decode_message(message.frames);
     if (!decoded) return send(message);
+    if (const auto* const welcome = std::get_if<WorkerWelcome>(&*decoded))
+      fmt::print(record_, "{} {} epoch {}\n", now_ms(), worker, welcome->epoch);
     for (const std::string& text : describe(*decoded))
       fmt::print(record_, "{} {} {}\n", now_ms(), worker, text);
 
@@ -189,7 +194,7 @@ class Proxy {
     const Command command = *std::exchange(command_, std::nullopt);
     if (command.harm == Harm::twice) send(message);
     if (command.harm != Harm::drop)
-      late_.push_back({Clock::now() + command.delay, std::move(message)});
+      late_.push_back({Clock::now() + command.delay, std::move(message), command.number});
   }
 
   void send(const Passing& message) {

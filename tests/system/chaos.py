@@ -45,7 +45,8 @@ def check_leftovers(farm):
 
 
 def finish(chaos):
-    """Leaves the farm alone until all is done. Nothing is submitted once more: what is missing then stays missing."""
+    """Leaves the farm alone until all is done. Nothing is submitted once more, but with --restart a job that only a worker of
+    another instruction set could go on with: what is missing then stays missing."""
     def all_done():
         chaos.tend()
         return not chaos.open_jobs()
@@ -63,10 +64,11 @@ def judge(chaos, farm, expected):
     check(chaos.proxy.is_quiet(4 * PATIENCE), "all is done, and somebody still reports")
     log, seen = farm.coordinator.log(), chaos.proxy.seen()
     check("BUG" not in log, "the coordinator has found a bug")
+    ids = {version: job.id for job in chaos.jobs for version in job.versions}
     num_tasks = witness.check_one_result_a_task(seen)
-    witness.check_nothing_revoked(seen, chaos.proxy.returns(), chaos.proxy.struck_ms(), chaos.ended_jobs)
-    num_superseded = witness.check_superseded_revoked(seen, chaos.proxy.struck_ms(), witness.reopened(log),
-                                                       {version: job.id for job in chaos.jobs for version in job.versions})
+    witness.check_nothing_revoked(seen, chaos.proxy.returns(), chaos.proxy.struck_ms(), chaos.proxy.epochs(),
+                                  witness.superseded(log), ids)
+    num_superseded = witness.check_superseded_revoked(seen, chaos.proxy.struck_ms(), witness.reopened(log), ids)
     again = witness.check_repeated(seen, log, chaos.struck, NUM_WORKERS, len(chaos.jobs), chaos.num_harmed)
     check_leftovers(farm)
     return (num_tasks, num_superseded, *again)

@@ -34,7 +34,7 @@ class Chaos(FrameFaults):
     def __init__(self, farm, proxy, disk, power, rng, longest_freeze_s):
         self.farm, self.proxy, self.disk, self.power, self.rng = farm, proxy, disk, power, rng
         self.longest_freeze_s = longest_freeze_s
-        self.jobs, self.ended_jobs, self.struck, self.thaws = [], set(), Counter(), {}
+        self.jobs, self.struck, self.thaws = [], Counter(), {}
         self.num_harmed, self.num_lost_in_cuts, self.healed_at, self.num_started = 0, 0, None, 0
         self.faults = [self.kill_worker, self.kill_coordinator, self.freeze_worker, self.freeze_coordinator,
                        self.supersede_worker, self.end_worker, self.end_coordinator, self.flip_byte, self.cut_blob,
@@ -294,8 +294,6 @@ class Chaos(FrameFaults):
             accepted = json.loads(answer.stdout)
             job.id = accepted["id"]
             if accepted["version"] not in job.versions[-1:]:
-                self.ended_jobs.update(job.versions)
-                self.ended_jobs.discard(accepted["version"])
                 job.versions.append(accepted["version"])
         return answer.returncode
 

@@ -18,6 +18,7 @@ STATE, FILM, IMAGE, FIRST_PASS = range(4)  # kinds of blobs
 # What one fault may cost: a worker of one thread has up to three leases in hand.
 LEASES_OF_WORKER = 3
 SILENCE_MS = 3900  # about when a coordinator gives a worker up
+LOG_MS = 100  # between a line of the log and its time in the record
 
 Seen = namedtuple("Seen", "ms worker type task attempt outputs")  # task: job, kind, step, tile; attempt: number, epoch
 
@@ -96,8 +97,12 @@ class Proxy:
         return [(int(words[0]), int(words[1])) for words in self.lines()
                 if len(words) == 4 and words[2] == "back" and int(words[3]) >= SILENCE_MS]
 
+    def epochs(self):
+        """(time, epoch) of each welcome of a coordinator."""
+        return [(int(words[0]), int(words[3])) for words in self.lines() if len(words) == 4 and words[2] == "epoch"]
+
     def struck_ms(self):
-        """When messages were struck."""
+        """When messages were struck, and when those went on that were delayed."""
         return [int(words[0]) for words in self.lines() if len(words) == 3 and words[1] == "struck"]
 
     def is_quiet(self, seconds):
@@ -132,15 +137,18 @@ def check_one_result_a_task(seen):
     return len(results)
 
 
-def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
+def check_nothing_revoked(seen, returns, struck_ms, epochs, ends, ids):
     """The newest attempt of a task stays with its worker until it reports, and a report whose lease is revoked is confirmed
-    in the end, unless the worker was silent, the coordinator has started anew, a message was struck, or the job has ended. A
-    report of an older attempt must not be taken for the newest. The confirmation may be lost with a connection: then the
-    worker says hello and names the lease."""
-    newest, reported, named_again, unconfirmed, epoch = {}, {}, set(), {}, 0
+    in the end, unless the worker was silent, the coordinator has started anew, a message was struck, or the version of the
+    job has ended. A report of an older attempt must not be taken for the newest. The confirmation may be lost with a
+    connection: then the worker says hello and names the lease.
+
+    epochs: (time, epoch) of each welcome: a coordinator that has started anew welcomes a worker before it takes a lease from
+    it, and may not have granted any. ends: of versions (superseded()). ids: of each version that is known; the answer to a
+    submission may be lost."""
+    newest, reported, named_again, unconfirmed = {}, {}, set(), {}
     for message in seen:
         lease = (message.task, message.attempt)
-        epoch = max(epoch, message.attempt[1])
         if message.type == "LeaseGrant":
             newest[message.task] = message
         elif message.type in ("TaskDone", "TaskFailed"):
@@ -153,7 +161,11 @@ def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
             since = reported.get(lease) or newest.get(message.task)
             if since is None or since.attempt != message.attempt:
                 continue
-            if message.task[0] in ended_jobs or message.attempt[1] < epoch:
+            if any(epoch > message.attempt[1] and ms <= message.ms for ms, epoch in epochs):
+                continue
+            ident = ids.get(message.task[0])
+            if any((ident is None or ident.startswith(job)) and since.ms - LOG_MS <= ms <= message.ms + LOG_MS
+                   for job, ms in ends):
                 continue
             if any(since.ms <= ms <= message.ms for ms in struck_ms):
                 continue
@@ -168,11 +180,20 @@ def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
 
 
 def reopened(log):
-    """(job, time) of each line of the coordinator's log that says that finished tasks of a job are done again: the beginning
-    of its ID, and the record's milliseconds."""
+    """times_in() of what says that finished tasks of a job are done again."""
+    return times_in(log, r"\d+ finished tasks are done again")
+
+
+def superseded(log):
+    """times_in() of what says that another version of a job, or another life of the same, takes the place of one."""
+    return times_in(log, "frames of another job take the place of its own")
+
+
+def times_in(log, words):
+    """(job, time) of each line of the coordinator's log that says this of a job: the beginning of its ID, and the record's
+    milliseconds."""
     offset_s, now, times = time.time() - time.monotonic(), datetime.datetime.now(), []
-    for hours, minutes, seconds, job in re.findall(r"^(\d\d):(\d\d):([\d.]+) .* job (\w+): \d+ finished tasks are done again",
-                                                   log, re.MULTILINE):
+    for hours, minutes, seconds, job in re.findall(r"^(\d\d):(\d\d):([\d.]+) .* job (\w+): " + words, log, re.MULTILINE):
         at = now.replace(hour=int(hours), minute=int(minutes), second=0, microsecond=0).timestamp() + float(seconds)
         if at > now.timestamp() + 1:
             at -= 24 * 3600

@@ -3,14 +3,17 @@
 submission."""
 
 import json
+import os
 import re
 import shutil
+import signal
 import time
 
-from farm import BAD_INPUT, IO, OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
+from farm import BAD_INPUT, DEADLINE_S, IO, OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
 
 FRAMES = 8
+STANDSTILL_S = 5  # longer than a worker may be silent
 
 
 def make(folder, **changes):
@@ -300,6 +303,64 @@ def a_locked_frame_outlives_everything(programs, folder):
         farm.baton("job", "lock", ident, "--frames", "2", "--off")
         check_says(farm.baton("job", "submit", make_loose(folder, seed=6, frames=f"2-{FRAMES}", **renamed), expect=IO).stderr,
                    "beauty.0002.exr is not what a job has written")
+
+def a_picture_that_comes_before_its_frame_is_kept(programs, folder):
+    """Nobody's here, it stays; --restart gives it up."""
+    other = folder / "other"
+    programs.render(make(other, seed=77), other / "work", threads=2)
+    pictures = {number: frame(other, number).read_bytes() for number in (1, 3)}
+    with Farm(programs, folder / "farm") as farm:
+        ident = farm.submit(make(folder))
+        for number, picture in pictures.items():
+            frame(folder, number).write_bytes(picture)
+        check_says(finish(farm, ident, expect=IO).stdout, "frame.0001.exr", "frame.0003.exr are not what a job has written here")
+        for number, picture in pictures.items():
+            check_equal(frame(folder, number).read_bytes(), picture, f"the picture in the place of frame {number}")
+        check_equal(farm.show(ident)["framesDone"], FRAMES, "frames, those of others among them")
+        frame(folder, 1).unlink()
+        farm.baton("job", "submit", folder / "job.json", "--restart")
+        farm.wait_for(ident)
+    check_equal(programs.pixels(folder / "frames"), _undisturbed(programs, folder), "pixels after --restart")
+
+
+def a_locked_frame_is_not_written_by_a_worker_that_was_silent(programs, folder):
+    """It was stopped while it wrote the frame, and lost its lease."""
+    large = {"image": {"width": 640, "height": 400, "tileSize": 128}, "state": {"carry": False},
+             "sampling": {"method": "environment", "numParticles": 1, "numCandidates": 1},
+             "output": {"aovs": ["depth", "normal", "position", "albedo", "lns", "visibility", "unshadowed", "blocked"]}}
+    with Farm(programs, folder / "farm") as farm:
+        worker = farm.start_worker()
+        ident = farm.submit(make(folder, **large))
+
+        # One that has not got its name yet.
+        end, written = time.monotonic() + DEADLINE_S, []
+        while not written and time.monotonic() < end:
+            written = [name for name in os.listdir(folder / "frames") if ".exr" in name and not name.endswith(".exr")]
+        os.kill(worker.pid, signal.SIGSTOP)
+        check(written, "no frame is seen while it is written")
+        number = int(re.search(r"frame\.(\d+)", written[0])[1])
+        place = frame(folder, number)
+        if place.exists():  # it was renamed meanwhile: no harm can be seen
+            place.unlink()
+        place.write_text("painted", encoding="ascii")
+        farm.baton("job", "lock", ident, "--frames", number)
+        os.kill(worker.pid, signal.SIGCONT)
+        finish(farm, ident)
+        check_equal(place.read_text(encoding="ascii"), "painted", f"the locked frame {number}")
+        check("have made different bytes" not in farm.coordinator.log(), "a locked frame was compared")
+
+
+def a_coordinator_that_stood_still_takes_nobody_for_silent(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        worker = farm.start_worker()
+        wait_until(lambda: "joined" in farm.coordinator.log(), "the worker is there")
+        for _ in range(3):
+            os.kill(farm.coordinator.pid, signal.SIGSTOP)
+            time.sleep(STANDSTILL_S)
+            os.kill(farm.coordinator.pid, signal.SIGCONT)
+            time.sleep(1)
+        check("is silent" not in farm.coordinator.log(), "a worker counts as silent")
+        check(worker.alive(), "the worker has ended")
 
 
 if __name__ == "__main__":

@@ -233,7 +233,9 @@ Result<Plate> read_plate(const LoadedJob& loaded, FrameNumber number) {
 }
 
 Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore& store,
-                                    const TaskKey& task, const std::vector<BlobRef>& inputs) {
+                                    const Grant& grant) {
+  const TaskKey& task = grant.lease.task;
+  const std::vector<BlobRef>& inputs = grant.inputs;
   const TileGrid grid(loaded.job.image);
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
   const FrameIndex frame = task.frame();
@@ -273,12 +275,20 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
     notes = plate_notes(file_at(*here.output.plate, number), plate);
     plate_image = std::move(plate.picture);
   }
-  BATON_ASSIGN(const WrittenFrame written,
-               write_frame(
-                   loaded.job, loaded.digest, frame, std::move(image), plate_image,
-                   [&] { return expect_output_folder(loaded); }, store.stop()));
-  return TaskResult{.made = {.outputs = {written.file},
-                             .frames = {{frame.value(), task.tile, {}, written.quality}}},
+  std::optional<PictureInPlace> other;
+  const auto may_appear = [&](const Digest& made) -> Status {
+    const std::filesystem::path path = frame_path(loaded.job, frame);
+    BATON_ASSIGN(other, find_picture_in_place(path, made, grant.may_replace));
+    if (other)
+      return Error{ErrorKind::cancelled, path.string() + ": another picture is in its place"};
+    return expect_unlocked(loaded, frame);
+  };
+  const Result<WrittenFrame> written = write_frame(
+      loaded.job, loaded.digest, frame, std::move(image), plate_image, may_appear, store.stop());
+  if (!written && other) return TaskResult{.made = {}, .in_place = std::move(other)};
+  if (!written) return written.error();
+  return TaskResult{.made = {.outputs = {written->file},
+                             .frames = {{frame.value(), task.tile, {}, written->quality}}},
                     .notes = std::move(notes)};
 }
 
@@ -295,7 +305,7 @@ Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const
     case TaskKind::second_pass:
       return execute_second_pass(loaded, patient, task, grant.inputs);
     case TaskKind::assemble:
-      return execute_assemble(loaded, patient, task, grant.inputs);
+      return execute_assemble(loaded, patient, grant);
   }
   return Error{ErrorKind::bad_input, "unknown kind of task"};
 }

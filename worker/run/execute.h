@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/task.h"
 #include "common/store/blob_store.h"
+#include "worker/run/frame_place.h"
 #include "worker/run/job_cache.h"
 
 namespace baton {
@@ -20,6 +22,8 @@ struct TaskResult {
   std::string unseen = {};
   /// Held inputs that are not here; then nothing was done.
   std::vector<BlobRef> not_held = {};
+  /// A picture that stands in the frame's place and stays; then the frame was not written.
+  std::optional<PictureInPlace> in_place = {};
   /// About files, for people: what was repaired, what is odd.
   std::vector<std::string> notes = {};
 };

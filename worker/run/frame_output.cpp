@@ -193,7 +193,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
 
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
                                  FilmTile image, const std::optional<RgbImage>& plate,
-                                 const std::function<Status()>& may_appear,
+                                 const std::function<Status(const Digest& made)>& may_appear,
                                  const std::stop_token& stop) {
   FrameQuality quality = judge_frame(image);
   if (job.output.clamp_negative) clamp_negative(image);
@@ -226,12 +226,13 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
                            .frame_number = number.value(),
                            .naming = naming_of(job),
                            .display_window = job.image.whole()}));
+  const Digest made = digest_of(bytes);
   const auto check = [&](const std::filesystem::path& temporary) -> Status {
     const Status verified = verify_frame(temporary, image, frame.value());
-    return verified && may_appear ? may_appear() : verified;
+    return verified && may_appear ? may_appear(made) : verified;
   };
   BATON_TRY(patiently([&] { return write_file_verified(path, bytes, check); }, stop));
-  return WrittenFrame{{BlobKind::image, frame.value(), 0, digest_of(bytes), bytes.size()}, quality};
+  return WrittenFrame{{BlobKind::image, frame.value(), 0, made, bytes.size()}, quality};
 }
 
 }  // namespace baton

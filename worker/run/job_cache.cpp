@@ -10,6 +10,7 @@
 #include "common/base/patiently.h"
 #include "common/job/plan/estimate.h"
 #include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
 #include "common/scene/material/detail_loader.h"
 #include "common/store/folder_token.h"
@@ -106,6 +107,17 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
 Status expect_output_folder(const LoadedJob& loaded) {
   if (loaded.token.empty()) return {};
   return expect_token(output_token_file(loaded.job.output.directory, loaded.digest), loaded.token);
+}
+
+Status expect_unlocked(const LoadedJob& loaded, FrameIndex frame) {
+  if (loaded.token.empty()) return {};
+  const std::filesystem::path mark = output_token_file(loaded.job.output.directory, loaded.digest);
+  BATON_ASSIGN(const std::string locked, read_after_token(mark, loaded.token));
+  if (locked.empty()) return {};
+  BATON_ASSIGN(const std::vector<FrameNumber> frames, parse_frames(locked));
+  const FrameNumber number = loaded.job.frames.at(frame.index());
+  if (!std::ranges::binary_search(frames, number)) return {};
+  return Error{ErrorKind::cancelled, fmt::format("frame {} is locked", number.value())};
 }
 
 void JobEntry::provide(const JobDocument& document) {

@@ -15,6 +15,8 @@ using namespace std::chrono_literals;
 /// Silence of so many heartbeats means "introduce yourself again".
 constexpr int kSilentHeartbeats = 3;
 constexpr auto kHelloInterval = 1000ms;
+/// A farm that is full is asked again after this.
+constexpr std::chrono::seconds kFullInterval{15};
 /// A report that is not confirmed after so many heartbeats is sent again.
 constexpr int kUnconfirmedHeartbeats = 2;
 /// So long before it must be gone the worker gives back what it has not finished.
@@ -77,9 +79,14 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   next_request_ = now;  // what ended may have made work
 
   // Report, unless the task was given up.
-  if (event.result && !(event.result->unseen.empty() && event.result->not_held.empty())) {
+  const bool is_undone =
+      event.result &&
+      (!event.result->unseen.empty() || !event.result->not_held.empty() || event.result->in_place);
+  if (is_undone) {
+    const PictureInPlace picture = event.result->in_place.value_or(PictureInPlace());
     actions.push_back(
-        SendMessage{LeaseReturn{event.lease, event.result->unseen, event.result->not_held}});
+        SendMessage{LeaseReturn{event.lease, event.result->unseen, event.result->not_held,
+                                picture.digest, picture.writer}});
   } else if (event.result) {
     reports_.push_back(
         {event.lease, TaskDone{event.lease, event.result->made, event.result->notes}, now});
@@ -130,7 +137,7 @@ void Session::on(const Tick&, TimePoint now, Actions& actions) {
           actions);
     return;
   }
-  const bool idle = welcomed_ && in_hand_.empty() && reports_.empty();
+  const bool idle = (welcomed_ || waits_for_room_) && in_hand_.empty() && reports_.empty();
   if (!idle) last_busy_ = now;
   if (options_.idle_exit > 0s && now - last_busy_ >= options_.idle_exit) {
     leave(fmt::format("there was nothing to do for {} s", options_.idle_exit.count()), actions);
@@ -169,6 +176,7 @@ void Session::on(const Tick&, TimePoint now, Actions& actions) {
 
 void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& actions) {
   welcomed_ = true;
+  waits_for_room_ = false;
   heartbeat_ = std::chrono::milliseconds(std::max(1, welcome.heartbeat_ms));
   next_heartbeat_ = now + heartbeat_;
   actions.push_back(UseStore{welcome.store_directory, welcome.token});
@@ -238,16 +246,21 @@ void Session::receive(const Shutdown&, TimePoint, Actions& actions) {
   actions.push_back(Leave{ExitCode::ok, "the coordinator shuts down"});
 }
 
-void Session::receive(const Refused& refused, TimePoint, Actions& actions) {
-  // Another version, or a key that is not that of a worker, will not change its mind; a farm that
-  // is full needs the connection; anything else is worth a line in the log.
+void Session::receive(const Refused& refused, TimePoint now, Actions& actions) {
+  // Another version, or a key that is not that of a worker, will not change its mind; anything else
+  // is worth a line in the log.
   const auto kind = static_cast<ErrorKind>(refused.kind);
-  const bool is_full = kind == ErrorKind::io && !welcomed_ && in_hand_.empty() && reports_.empty();
-  if (kind == ErrorKind::version || kind == ErrorKind::usage || is_full) {
+  if (kind == ErrorKind::version || kind == ErrorKind::usage) {
     actions.push_back(Leave{exit_code_of(kind), refused.message});
-  } else {
-    actions.push_back(Warn{"the coordinator says: " + refused.message});
+    return;
   }
+  actions.push_back(Warn{"the coordinator says: " + refused.message});
+  // A farm that is full needs the connection, and may have room later.
+  if (kind != ErrorKind::timeout || welcomed_) return;
+  const bool is_hasty = options_.give_up > 0s && options_.give_up < 2 * kFullInterval;
+  next_hello_ = now + (is_hasty ? options_.give_up / 2 : kFullInterval);
+  waits_for_room_ = true;
+  actions.push_back(HangUp{});
 }
 
 // ---- helpers ------------------------------------------------------------------------------------

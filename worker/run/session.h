@@ -78,12 +78,14 @@ struct TakeDocument {
 struct Warn {
   std::string message;
 };
+/// End the connection until there is something to say.
+struct HangUp {};
 struct Leave {
   ExitCode code = ExitCode::ok;
   std::string reason;
 };  ///< abandon everything and end
 using SessionAction = std::variant<SendMessage, UseStore, StartTask, PackHeld, StopTask,
-                                   DropQueuedTasks, TakeDocument, Warn, Leave>;
+                                   DropQueuedTasks, TakeDocument, Warn, HangUp, Leave>;
 
 /// The worker's side of the conversation with the coordinator: events in, actions out. Knows no
 /// socket, thread or file; time comes as an argument.
@@ -141,6 +143,7 @@ class Session {
 
   SessionOptions options_;
   bool welcomed_ = false;
+  bool waits_for_room_ = false;  ///< the farm was full
   bool draining_ = false;
   std::optional<std::string> leaving_;     ///< why; all that is held is being packed
   std::optional<TimePoint> give_back_at_;  ///< what is not finished then goes back

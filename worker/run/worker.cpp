@@ -354,6 +354,7 @@ class Worker {
     jobs_.entry(action.document.job)->provide(action.document);
   }
   void perform(Warn& action) { spdlog::warn("{}", action.message); }
+  void perform(HangUp&) { channel_.hang_up(); }
   void perform(Leave& action) { leave_ = std::move(action); }
 
   /// The ID of a job, for people; as long as its document has not come, what is known of that.

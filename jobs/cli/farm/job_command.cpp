@@ -105,8 +105,7 @@ void print_detail(const ShownJob& job, bool json) {
   fmt::print("{}", times_text(job.identity.times));
   if (job.identity.version > 1) fmt::print("version    {}\n", job.identity.version);
   if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
-  if (!job.identity.locked.empty())
-    fmt::print("locked     {}\n", format_frames(job.identity.locked));
+  if (!job.locked.empty()) fmt::print("locked     {}\n", format_frames(job.locked));
   fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
   if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
   for (const std::string& note : detail.notes) fmt::print("warning    {}\n", note);
@@ -117,15 +116,6 @@ Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const ShownJob job, ask<ShownJob>(client, ShowJob{options.job}));
   print_detail(job, options.json);
   return ExitCode::ok;
-}
-
-/// What a growing job has decided since the last call. first: of one that is looked at for the
-/// first time the newest decision is enough.
-void print_growth(const ShownJob& job, std::size_t& num_told, bool is_first) {
-  const std::vector<std::string>& said = job.growth;
-  if (is_first && said.size() > 1) num_told = said.size() - 1;
-  for (num_told = std::min(num_told, said.size()); num_told < said.size(); ++num_told)
-    fmt::print(stderr, "{}\n", said[num_told]);
 }
 
 /// A coordinator that has answered once may be away for a while: it is started again.
@@ -147,7 +137,10 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
       continue;
     }
 
-    print_growth(*answer, num_grown, !last_answer);
+    // The newest decision is enough of what was decided before.
+    if (!last_answer && answer->growth.size() > 1) num_grown = answer->growth.size() - 1;
+    for (const std::string& line : fresh_growth(*answer, num_grown))
+      fmt::print(stderr, "{}\n", line);
     last_answer = Clock::now();
     job = answer->identity.id.hex();
     const JobDetail& detail = answer->detail;

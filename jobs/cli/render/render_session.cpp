@@ -95,9 +95,9 @@ Result<std::optional<ShownJob>> RenderSession::follow(const JobSpec& spec, const
         progress.finish();
         spdlog::warn("{}", note);
       }
-      for (; num_grown < shown->growth.size(); ++num_grown) {
+      for (const std::string& line : fresh_growth(*shown, num_grown)) {
         progress.finish();
-        fmt::print(stderr, "{}\n", shown->growth[num_grown]);
+        fmt::print(stderr, "{}\n", line);
       }
       // More sweeps make all frames anew.
       if (version != shown->detail.summary.version) {

@@ -50,7 +50,7 @@ const JobSummary kSummary{
     {1, 2}, "name", "owner", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6, 7, 8,
     9,      10,     11,      kStats};
 
-const JobIdentity kIdentity{{9}, 2, {10, 11, 12}, {FrameNumber(7)}};
+const JobIdentity kIdentity{{9}, 2, {10, 11, 12}};
 const TaskPlace kPlace{TaskKind::second_pass, FrameNumber(3), FrameNumber(4), 5, 6};
 
 /// One of each, in the order of the type codes, no member left at its default.
@@ -64,7 +64,7 @@ const std::vector<Message>& examples() {
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
       WorkerWelcome{3, 500, "/store", "mark"},
-      LeaseGrant{kLease, {kBlob}, {Step(4), Step(5)}, true, Step(6), 1.5},
+      LeaseGrant{kLease, {kBlob}, {Step(4), Step(5)}, true, Step(6), 1.5, {{5, 6}}},
       LeaseRevoke{kLease},
       NoWork{250},
       HelloAgain{},
@@ -87,7 +87,8 @@ const std::vector<Message>& examples() {
                 false,
                 {"odd"}},
                true,
-               {"4 rounds"}},
+               {"4 rounds"},
+               {FrameNumber(7)}},
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
@@ -95,7 +96,7 @@ const std::vector<Message>& examples() {
       Drain{},
       ReportReceived{kLease},
       DeleteJob{"def"},
-      LeaseReturn{kLease, "/shows", {kBlob}},
+      LeaseReturn{kLease, "/shows", {kBlob}, {5, 6}, "ab"},
       StatesPublished{{1, 2}, {{kBlob, kBlob}}},
       RequestStates{{3, 4}, {{5, 6}}},
       BlobsLeft{kLease, {{5, 6}}},
@@ -126,13 +127,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 13);
+  static_assert(kProtocolVersion == 14);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "64e8b6abe9dd095e43c83fb201e7a3da");
+  EXPECT_EQ(digest_of(all).hex(), "d78bd5edb945b42ec0b74e19cfa8ca83");
 }
 
 TEST(Messages, MembersArriveWhereTheyWereSent) {
@@ -145,7 +146,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0D\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0E\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -185,12 +186,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{14};
+  frames[0][5] = std::byte{15};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 14, this program speaks 13"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 15, this program speaks 14"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

@@ -8,9 +8,11 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/image/image_io.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
+#include "common/store/folder_token.h"
 #include "tests/support/local_frames.h"
 #include "tests/support/log_listener.h"
 #include "worker/run/frame_output.h"
@@ -480,6 +482,41 @@ TEST_F(ExecuteTest, AReplayOfWhatTheJobDoesNotHaveSaysWhatThereIs) {
           .error()
           .message,
       testing::HasSubstr("x in [0, 15]"));
+}
+
+TEST_F(ExecuteTest, AnAssemblyReplacesNeitherAPictureOfOthersNorALockedFrame) {
+  const auto films = render_all();
+  const std::filesystem::path frame = frame_path(job_, FrameIndex(1));
+  const FilmTile other{.rect = {0, 0, 2, 2}, .channels = {"Y"}, .values = {1, 2, 3, 4}};
+  ASSERT_TRUE(write_exr(frame.string(), other, {.display_window = other.rect}));
+  const Bytes bytes = read_file(frame, 1 << 20).value();
+
+  // It stays until the coordinator lets it go.
+  Grant grant{.lease = {.job = loaded_->digest, .task = assemble_task(FrameIndex(1))},
+              .inputs = films.at(Step(1)),
+              .steps = {}};
+  Result<TaskResult> output = execute_task(*loaded_, store_.value(), grant, {});
+  ASSERT_TRUE(output) << output.error().message;
+  ASSERT_TRUE(output->in_place);
+  EXPECT_EQ(output->in_place->digest, digest_of(bytes));
+  EXPECT_TRUE(output->made.outputs.empty());
+  EXPECT_EQ(read_file(frame, 1 << 20).value(), bytes);
+
+  // The mark says whether a frame is locked meanwhile.
+  grant.may_replace = {digest_of(bytes)};
+  LoadedJob marked = *loaded_;
+  marked.token = "token";
+  const std::filesystem::path mark = output_token_file(job_.output.directory, marked.digest);
+  ASSERT_TRUE(write_token(mark, marked.token, "2,4-5"));
+  output = execute_task(marked, store_.value(), grant, {});
+  ASSERT_FALSE(output);
+  EXPECT_EQ(output.error().kind, ErrorKind::cancelled);
+  EXPECT_EQ(read_file(frame, 1 << 20).value(), bytes);
+  ASSERT_TRUE(write_token(mark, marked.token, "1,3-5"));
+  output = execute_task(marked, store_.value(), grant, {});
+  ASSERT_TRUE(output) << output.error().message;
+  EXPECT_EQ(output->made.outputs.size(), 1u);
+  EXPECT_NE(read_file(frame, 1 << 20).value(), bytes);
 }
 
 }  // namespace

@@ -120,5 +120,35 @@ TEST_F(PilotSessionTest, EndsWhenThereIsNothingToDo) {
   EXPECT_NE(find<Leave>(tick_after(2s)), nullptr);
 }
 
+TEST_F(SessionTest, NamesThePictureInItsFramesPlace) {
+  welcome();
+  grant(lease(0));
+  const auto actions =
+      step(TaskEnded{lease(0), TaskResult{.made = {}, .in_place = PictureInPlace{{7, 8}, "ab"}}});
+  ASSERT_EQ(sent<LeaseReturn>(actions).size(), 1u);
+  EXPECT_EQ(sent<LeaseReturn>(actions)[0].in_place, (Digest{7, 8}));
+  EXPECT_EQ(sent<LeaseReturn>(actions)[0].writer, "ab");
+  EXPECT_TRUE(sent<TaskDone>(actions).empty());
+}
+
+// It gives its connection up, and comes back: somebody may have left.
+TEST_F(SessionTest, AFullFarmIsAskedAgain) {
+  const auto refuse = [&](ErrorKind kind) {
+    return receive(Refused{static_cast<std::uint8_t>(kind), "the farm is full"});
+  };
+  EXPECT_EQ(sent<WorkerHello>(tick_after(0ms)).size(), 1u);
+  for (int i = 0; i < 10; ++i) {
+    const auto actions = refuse(ErrorKind::timeout);
+    EXPECT_NE(find<HangUp>(actions), nullptr);
+    EXPECT_EQ(find<Leave>(actions), nullptr);
+    EXPECT_TRUE(sent<WorkerHello>(tick_after(14s)).empty());
+    EXPECT_EQ(sent<WorkerHello>(tick_after(1s)).size(), 1u);
+  }
+  EXPECT_FALSE(sent<LeaseRequest>(welcome()).empty());
+  EXPECT_EQ(find<HangUp>(refuse(ErrorKind::timeout)), nullptr) << "it is let in";
+  EXPECT_EQ(find<Leave>(refuse(ErrorKind::io)), nullptr);
+  EXPECT_NE(find<Leave>(refuse(ErrorKind::version)), nullptr);
+}
+
 }  // namespace
 }  // namespace baton

@@ -68,8 +68,7 @@ class Shop {
           done.push_back({task.task, {task.outputs}});
       }
     }
-    for (const BlobRef& image : adoption_.images)
-      done.push_back({assemble_task(image.frame()), {{image}}});
+    done.insert(done.end(), adoption_.frames.begin(), adoption_.frames.end());
     for (const TaskKey& task : adoption_.skipped) done.push_back({task, {}});
     return done;
   }
@@ -183,7 +182,7 @@ TEST(Adoption, FewerFramesAndOtherSettingsNeedNothing) {
   fewer.name = "another name";
   fewer.metadata["shot"] = "12";
   EXPECT_THAT(shop.work(fewer), IsEmpty());
-  EXPECT_EQ(shop.adoption().images.size(), 5u);
+  EXPECT_EQ(shop.adoption().frames.size(), 5u);
   // And what the first job has written is still there for a third.
   EXPECT_THAT(shop.work(small_job(2, 12, 12)), IsEmpty());
 }
@@ -307,6 +306,43 @@ TEST(Adoption, ACarriedHistoryBeginsWithTheFirstFrame) {
   EXPECT_NE(document_of(job).picture, document_of(with_frames(job, 2, 8)).picture);
   JobSpec fresh = small_job(1, 8, 2, /*carry=*/false);
   EXPECT_EQ(document_of(fresh).picture, document_of(with_frames(fresh, 2, 8)).picture);
+}
+
+// Whichever of several former jobs wrote a frame, and at whatever place.
+TEST(Adoption, AFrameThatIsKeptBringsWhatWasSeenOfIt) {
+  const JobSpec job = small_job(1, 6, 2, false);
+  const auto image_of = [](int number, FrameIndex place) {
+    return BlobRef{BlobKind::image, place.value(), 0, digest_of(std::to_string(number)), 100};
+  };
+  const auto former = [&](int first, int last) {
+    FormerJob made{document_of(with_frames(job, first, last)), {}, {}, JobStatus::done};
+    for (FrameIndex place; place.index() < made.document.job.frames.size(); ++place) {
+      const int number = made.document.job.frames[place.index()].value();
+      made.tasks.push_back({assemble_task(place), {image_of(number, place)}});
+      made.frames[place].position = place.value();
+      made.frames[place].quality.cycles_noise = static_cast<float>(number);
+    }
+    return made;
+  };
+  // The newest has frame 6 from before, and nothing was told of it.
+  FormerJob blind = former(5, 6);
+  blind.frames.clear();
+  const KeptFiles files{.has_frame =
+                            [&](FrameIndex frame, const BlobRef& image) {
+                              return image.digest ==
+                                     image_of(job.frames[frame.index()].value(), frame).digest;
+                            },
+                        .has_blob = [](const BlobRef&) { return false; }};
+  const Adoption adoption =
+      adopt(document_of(job), {blind, former(1, 3), former(4, 5), former(5, 6)}, files);
+  ASSERT_EQ(adoption.frames.size(), 6u);
+  for (const Completion& frame : adoption.frames) {
+    const int place = frame.task.frame().value();
+    ASSERT_EQ(frame.made.frames.size(), 1u) << place;
+    EXPECT_EQ(frame.made.frames[0].frame(), FrameIndex(place));
+    EXPECT_EQ(frame.made.frames[0].quality.cycles_noise, static_cast<float>(place + 1));
+    EXPECT_FALSE(JobGraph(job).check_frames(frame.task, frame.made.frames));
+  }
 }
 
 }  // namespace

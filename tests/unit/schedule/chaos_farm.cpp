@@ -61,7 +61,7 @@ void ChaosFarm::change_job(JobSpec next) {
                        const BlobRef&) { return written.contains(next.frames[frame.index()]); },
       .has_blob = [&](const BlobRef& blob) { return store_.contains(blob.digest); }};
   const Adoption adoption = adopt(document_of(next), {former}, files);
-  num_kept_frames_ += adoption.images.size();
+  num_kept_frames_ += adoption.frames.size();
   num_cuts_ += adoption.plan.cuts.size();
 
   std::vector<Completion> taken;
@@ -69,8 +69,7 @@ void ChaosFarm::change_job(JobSpec next) {
   for (const Completion& done : completions_) {
     if (tasks.contains(done.task)) taken.push_back(done);
   }
-  for (const BlobRef& image : adoption.images)
-    taken.push_back({assemble_task(image.frame()), {{image}}});
+  taken.insert(taken.end(), adoption.frames.begin(), adoption.frames.end());
   for (const TaskKey& task : adoption.skipped) taken.push_back({task, {}});
   spec_ = std::move(next);
   spec_.leading_runs = adoption.plan.leading_runs;

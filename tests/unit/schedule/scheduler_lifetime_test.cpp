@@ -273,5 +273,56 @@ TEST_F(SchedulerTest, AFrameThatIsLostTooOftenPausesItsJob) {
   EXPECT_THAT(own.scheduler.waits_for(own.job, own.now), testing::HasSubstr("lost 16 times"));
 }
 
+// ---- frames that others have written ------------------------------------------------------------
+
+/// One tile, one frame; the assembly is granted to "a".
+struct PlaceTest : testing::Test {
+  Farm own{small_job(1, 1, 1, false)};
+  GrantLease frame;
+
+  void SetUp() override {
+    own.submit();
+    own.step(WorkerJoined{"a", {}});
+    own.step(WorkerJoined{"b", {}});
+    own.finish(own.ask_one("a"));
+    frame = own.ask_one("a");
+    ASSERT_EQ(frame.lease.task, assemble(0));
+  }
+};
+
+// Its worker was silent while it was locked, and says too late what it has written.
+TEST_F(PlaceTest, ALateReportOfALockedFrameIsNoConflict) {
+  own.now += 2 * kSilence;
+  own.step(WorkerAlive{"b", {}});
+  own.step(ClockTicked{});
+  ASSERT_EQ(own.progress().attempts_lost, 1u);
+  own.scheduler.step(FramesLocked{own.job, {FrameIndex(0)}}, own.now);
+  own.scheduler.step(WorkerJoined{"a", {frame.lease}}, own.now);
+  const auto actions = own.scheduler.step(
+      TaskCompleted{"a", frame.lease, {outputs_of(own.spec(), own.job, assemble(0))}}, own.now);
+  EXPECT_THAT(all_of<ReportConflict>(actions), IsEmpty());
+  EXPECT_EQ(own.status(), JobStatus::running);
+}
+
+TEST_F(PlaceTest, APictureThatStaysCountsAsTheFrame) {
+  const auto actions = own.scheduler.step(PlaceTaken{"a", frame.lease}, own.now);
+  const auto recorded = all_of<RecordCompletion>(actions);
+  ASSERT_THAT(recorded, SizeIs(1));
+  EXPECT_TRUE(recorded[0].completion.made.outputs.at(0).is_any_image());
+  ASSERT_THAT(all_of<TellLeaseEnd>(actions), SizeIs(1));
+  EXPECT_EQ(all_of<TellLeaseEnd>(actions)[0].end, LeaseEnd::returned);
+  EXPECT_THAT(all_of<InspectFrames>(actions), SizeIs(1)) << "the end tells of it";
+  EXPECT_THAT(own.scheduler.step(PlaceTaken{"b", frame.lease}, own.now), IsEmpty()) << "late";
+}
+
+TEST_F(PlaceTest, OneThatMayGoIsNobodysFailure) {
+  EXPECT_THAT(all_of<RecordCompletion>(own.step(PlaceTaken{"a", frame.lease, false})), IsEmpty());
+  const GrantLease again = own.ask_one("b");
+  EXPECT_EQ(again.lease.task, assemble(0));
+  own.finish(again);
+  EXPECT_EQ(own.status(), JobStatus::done);
+  EXPECT_EQ(own.progress().attempts_lost, 0u);
+}
+
 }  // namespace
 }  // namespace baton

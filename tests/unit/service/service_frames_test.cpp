@@ -72,6 +72,9 @@ struct FramesTest : ServiceTest {
     ADD_FAILURE() << "the job does not end";
     return show(endpoint, id);
   }
+  std::vector<FrameNumber> locked_frames(const std::string& endpoint, const Digest& id) {
+    return ask<ShownJob>(endpoint, ShowJob{id.hex()}).locked;
+  }
   static void sync(FakeWorker& worker) {
     worker.say(LeaseRequest{0});
     worker.say(Heartbeat{});
@@ -331,12 +334,12 @@ TEST_F(FramesTest, ALockedFrameStaysWhateverComes) {
     put(2, std::string(kPicture));
     const ShownJob locked =
         ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}});
-    EXPECT_THAT(locked.identity.locked, ElementsAre(FrameNumber(2)));
+    EXPECT_THAT(locked.locked, ElementsAre(FrameNumber(2)));
     EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
   }
   // Through a restart of the coordinator, another version and another picture.
   const RunningService service(options);
-  EXPECT_THAT(show_identity(service.endpoint(), id.hex()).locked, ElementsAre(FrameNumber(2)));
+  EXPECT_THAT(locked_frames(service.endpoint(), id), ElementsAre(FrameNumber(2)));
   job.priority = 7;
   for (const std::uint64_t seed : {job.seed, job.seed + 1}) {
     job.seed = seed;
@@ -344,7 +347,7 @@ TEST_F(FramesTest, ALockedFrameStaysWhateverComes) {
     worker.hello();
     const JobAccepted accepted = ask<JobAccepted>(
         service.endpoint(), SubmitJob{make_job_document(job).value(), /*restart=*/true});
-    EXPECT_THAT(accepted.identity.locked, ElementsAre(FrameNumber(2)));
+    EXPECT_THAT(locked_frames(service.endpoint(), accepted.version), ElementsAre(FrameNumber(2)));
     EXPECT_THAT(accepted.plan, HasSubstr("frame 2 is locked and stays as it is"));
     EXPECT_EQ(finish(service.endpoint(), worker, accepted.version).summary.status, JobStatus::done);
     EXPECT_EQ(read_text_file(frame(2), 100).value(), kPicture);
@@ -420,7 +423,7 @@ TEST_F(FramesTest, OnlyFramesThatAreThereCanBeLocked) {
   EXPECT_THAT(refusal.message, HasSubstr("frame.0004.exr: is not there, and cannot be locked"));
   refusal = refused(service.endpoint(), LockFrames{id.hex(), {FrameNumber(1)}, /*off=*/true});
   EXPECT_THAT(refusal.message, HasSubstr("frames 1 are not locked"));
-  EXPECT_THAT(show_identity(service.endpoint(), id.hex()).locked, SizeIs(0));
+  EXPECT_THAT(locked_frames(service.endpoint(), id), SizeIs(0));
 
   // One that a worker is writing: the client asks again.
   worker.say(LeaseRequest{1});
@@ -431,6 +434,296 @@ TEST_F(FramesTest, OnlyFramesThatAreThereCanBeLocked) {
   worker.say(report);
   EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
   EXPECT_TRUE(fs::exists(path));
+}
+
+// In a renamed file, through a restart of the coordinator, and back when it is unlocked: workers
+// ask the mark before a frame gets its name.
+TEST_F(FramesTest, TheMarkSaysWhichFramesAreLocked) {
+  Digest id;
+  const auto marked = [&] { return read_text_file(mark(id), 1000).value(); };
+  std::string token;
+  {
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    id = begin(service.endpoint(), worker);
+    token = marked();
+    ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2), FrameNumber(3)}});
+    EXPECT_EQ(marked(), token + "\n2-3");
+    ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}, /*off=*/true});
+    EXPECT_EQ(marked(), token + "\n3");
+  }
+  // Whoever was killed between the lock and its commit leaves a mark that says too much.
+  ASSERT_TRUE(write_token(mark(id), token, "1-4"));
+  const RunningService service(options);
+  EXPECT_EQ(marked(), token + "\n3");
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  EXPECT_FALSE(fs::exists(mark(id))) << "all is done";
+}
+
+// ---- pictures in the places of frames -----------------------------------------------------------
+
+/// Painted over, with the headers of the job that wrote the frame.
+TEST_F(FramesTest, APaintedFrameThatNamesItsJobIsKeptWithoutRestart) {
+  const RunningService service(options);
+  for (const std::string how : {"done", "failed", "cancelled", "unlocked"}) {
+    SCOPED_TRACE(how);
+    FakeWorker worker(service.endpoint(), store(), job, "w" + how);
+    const Digest id = begin(service.endpoint(), worker);
+    const std::string painted = std::string(kPicture) + id.hex();
+    if (how == "failed") put(2, painted);
+    if (how == "cancelled") ask<ShownJob>(service.endpoint(), CancelJob{id.hex()});
+    const JobStatus status = how == "cancelled"
+                                 ? JobStatus::cancelled
+                                 : finish(service.endpoint(), worker, id).summary.status;
+    EXPECT_EQ(status, how == "failed"      ? JobStatus::failed
+                      : how == "cancelled" ? JobStatus::cancelled
+                                           : JobStatus::done);
+    put(2, painted);
+    if (how == "unlocked") {
+      ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}});
+      ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+      ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}, /*off=*/true});
+    }
+    const Error refusal = refused(service.endpoint(), SubmitJob{document});
+    EXPECT_EQ(refusal.kind, ErrorKind::io);
+    EXPECT_THAT(refusal.message, HasSubstr("frame.0002.exr is not what a job has written"));
+    EXPECT_EQ(read_text_file(frame(2), 100).value(), painted);
+    ask<JobAccepted>(service.endpoint(), SubmitJob{document, true});
+    finish(service.endpoint(), worker, id);
+    EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
+    ask<JobList>(service.endpoint(), DeleteJob{id.hex()});
+    fs::remove_all(job.output.directory);
+    worker.say(WorkerGoodbye{});
+  }
+}
+
+/// Does all but the assembly of frame 2, which a worker of its own has.
+struct PlaceTest : FramesTest {
+  std::string picture = "picture of somebody";
+
+  LeaseId wait_for_frame_2(FakeWorker& worker) {
+    for (int i = 0; i < 20; ++i) {
+      worker.say(LeaseRequest{1});
+      const LeaseGrant grant = worker.expect<LeaseGrant>();
+      granted = grant.may_replace;
+      if (grant.lease.task == assemble_task(FrameIndex(1))) return grant.lease;
+      worker.say(worker.work(grant.lease));
+    }
+    ADD_FAILURE() << "frame 2 is not asked for";
+    return {};
+  }
+  void say_taken(FakeWorker& worker, const LeaseId& lease, const std::string& writer) const {
+    worker.say(LeaseReturn{lease, {}, {}, digest_of(picture), writer});
+  }
+  /// LeaseGrant::may_replace of the last grant.
+  std::vector<Digest> granted;
+};
+
+TEST_F(PlaceTest, ThePictureOfSomebodyElseStaysAndTheJobFails) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    put(2, picture);
+    const LeaseId lease = wait_for_frame_2(worker);
+    EXPECT_THAT(granted, SizeIs(0));
+    say_taken(worker, lease, "somebody");
+    const JobDetail detail = finish(service.endpoint(), worker, id);
+    EXPECT_EQ(detail.summary.status, JobStatus::failed);
+    EXPECT_THAT(detail.waits, HasSubstr("frame.0002.exr is not what a job has written"));
+    EXPECT_EQ(detail.summary.tasks_failed, 0u);
+    EXPECT_EQ(read_text_file(frame(2), 100).value(), picture);
+    EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message,
+                HasSubstr("frame.0002.exr is not what a job has written"));
+
+    // Somebody gives it up, and the coordinator ends before it is replaced.
+    ask<JobAccepted>(service.endpoint(), SubmitJob{document, true});
+  }
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  const LeaseId lease = wait_for_frame_2(worker);
+  EXPECT_THAT(granted, testing::Contains(digest_of(picture)));
+  worker.say(worker.work(lease));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+
+  // What was given up was that picture there, once.
+  put(2, picture);
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message,
+              HasSubstr("frame.0002.exr is not what a job has written"));
+}
+
+TEST_F(PlaceTest, OnceItIsGoneTheFrameIsMade) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  put(2, picture);
+  say_taken(worker, wait_for_frame_2(worker), {});
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::failed);
+  fs::remove(frame(2));
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
+}
+
+// A worker of a former version was late.
+TEST_F(PlaceTest, WhatAFormerJobHasLeftMayGo) {
+  const RunningService service(options);
+  JobSpec urgent = job;
+  urgent.priority = 7;
+  const Digest former =
+      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).version;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  put(2, picture);
+  const LeaseId lease = wait_for_frame_2(worker);
+  say_taken(worker, lease, former.hex());
+  const LeaseId again = wait_for_frame_2(worker);
+  EXPECT_NE(again, lease);
+  EXPECT_THAT(granted, ElementsAre(digest_of(picture)));
+  worker.say(worker.work(again));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+}
+
+// ---- jobs that grow -----------------------------------------------------------------------------
+
+struct GrowthTest : FramesTest {
+  void SetUp() override {
+    FramesTest::SetUp();
+    job.sampling.method = Method::pool;
+    job.state.carry = false;
+    job.quality = {.rounds = 1, .sweeps = 2};
+  }
+  std::string document_of(int first, int last) {
+    job.frames.clear();
+    for (int frame = first; frame <= last; ++frame) job.frames.emplace_back(frame);
+    return make_job_document(job).value();
+  }
+  /// Has the frames rendered, each as noisy as its number says.
+  JobDetail render(const std::string& text, bool restart = false) {
+    const Digest id = ask<JobAccepted>(endpoint, SubmitJob{text, restart}).version;
+    FakeWorker worker(endpoint, store(), job, "w" + std::to_string(++num_workers));
+    worker.hello();
+    for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
+         std::chrono::steady_clock::now() < deadline;) {
+      const JobDetail detail = show(endpoint, id);
+      if (detail.summary.status != JobStatus::running) return detail;
+      if (detail.summary.tasks_done == detail.summary.tasks_total) continue;
+      worker.say(LeaseRequest{1});
+      const LeaseGrant grant = worker.expect<LeaseGrant>();
+      TaskDone done = worker.work(grant.lease);
+      if (grant.lease.task.kind == TaskKind::assemble) {
+        const std::int32_t place = grant.lease.task.frame().value();
+        const int number = job.frames[grant.lease.task.frame().index()].value();
+        FrameStats stats{place, 0, {}};
+        stats.quality.pixels = 1;
+        stats.quality.cycles_noise = static_cast<float>(number);
+        done.made.frames = {stats};
+      }
+      worker.say(done);
+      sync(worker);
+    }
+    ADD_FAILURE() << "the job does not end";
+    return {};
+  }
+  std::vector<std::string> growth() { return ask<ShownJob>(endpoint, ShowJob{job.name}).growth; }
+  int num_workers = 0;
+  std::string endpoint;
+};
+
+TEST_F(GrowthTest, FramesOfAllFormerVersionsTellTheirNoise) {
+  const RunningService service(options);
+  endpoint = service.endpoint();
+  EXPECT_EQ(render(document_of(1, 2)).summary.status, JobStatus::done);
+  EXPECT_EQ(render(document_of(3, 4)).summary.status, JobStatus::done);
+  job.quality.noise_threshold = 3.5f;
+  job.quality.max_rounds = 2;
+  const JobDetail detail = render(document_of(1, 4));
+  ASSERT_EQ(detail.frames.size(), 4u);
+  for (const FrameReport& frame : detail.frames)
+    EXPECT_EQ(frame.quality.cycles_noise, static_cast<float>(frame.frame.value()));
+  EXPECT_THAT(growth(), ElementsAre(HasSubstr("2 rounds: noise 4 as Cycles measures it")));
+
+  // One that does not grow says nothing of it.
+  job.quality.noise_threshold.reset();
+  job.quality.max_rounds = 0;
+  ask<JobAccepted>(endpoint, SubmitJob{document_of(1, 4)});
+  EXPECT_THAT(growth(), SizeIs(0));
+}
+
+// What is not there any more has no sweeps.
+TEST_F(GrowthTest, AJobWhoseFramesAreGoneBeginsAnew) {
+  const RunningService service(options);
+  endpoint = service.endpoint();
+  EXPECT_EQ(render(document_of(1, 2)).summary.status, JobStatus::done);
+  const auto sweeps_of = [&](const JobAccepted& accepted) {
+    const std::string text = ask<JobDocument>(endpoint, JobDocumentRequest{accepted.version}).json;
+    return parse_job_document(text).value().job.quality.sweeps;
+  };
+  job.quality = {.rounds = 1, .sweeps = 1, .noise_threshold = 3.5f, .max_rounds = 2};
+  const std::string text = document_of(1, 2);
+  fs::remove(frame(1));
+  EXPECT_EQ(sweeps_of(ask<JobAccepted>(endpoint, SubmitJob{text})), 2);
+  ask<ShownJob>(endpoint, CancelJob{job.name});
+  fs::remove(frame(2));
+  EXPECT_EQ(sweeps_of(ask<JobAccepted>(endpoint, SubmitJob{text})), 1);
+}
+
+// ---- neighbours and patience --------------------------------------------------------------------
+
+// The frames that two jobs share are locked: none of them says whose picture the open one is.
+TEST_F(FramesTest, AnOpenJobIsNotEndedForLockedFramesAlone) {
+  const RunningService service(options);
+  job.frames = {FrameNumber(1), FrameNumber(3)};
+  document = make_job_document(job).value();
+  const Digest mine = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  EXPECT_EQ(finish(service.endpoint(), worker, mine).summary.status, JobStatus::done);
+  JobSpec other = job;
+  other.name = "other";
+  other.seed += 1;
+  other.frames = {FrameNumber(1), FrameNumber(2)};
+  const Digest open =
+      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(other).value(), true})
+          .version;
+  ask<ShownJob>(service.endpoint(), LockFrames{mine.hex(), {FrameNumber(1)}});
+  job.priority = 7;
+  const std::string next = make_job_document(job).value();
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{next}).message, HasSubstr("wait for its end"));
+  EXPECT_EQ(show(service.endpoint(), open).summary.status, JobStatus::running);
+  ask<JobAccepted>(service.endpoint(), SubmitJob{next, true});
+  EXPECT_EQ(show(service.endpoint(), open).summary.status, JobStatus::cancelled);
+}
+
+// A frame that was readable meanwhile is waited for anew.
+TEST_F(FramesTest, PatienceBeginsAnewOnceAFrameWasReadable) {
+  options.file_patience = 1500ms;
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  ask<ShownJob>(service.endpoint(), PauseJob{id.hex()});
+  const auto touch = [&] { fs::last_write_time(frame(2), fs::last_write_time(frame(2)) + 1s); };
+  const auto refusal = [&] { return refused(service.endpoint(), ResumeJob{id.hex()}).kind; };
+  broken = "frame.0002.exr";
+  touch();
+  EXPECT_EQ(refusal(), ErrorKind::timeout);
+  broken = "";
+  ask<ShownJob>(service.endpoint(), ResumeJob{id.hex()});
+  ask<ShownJob>(service.endpoint(), PauseJob{id.hex()});
+  std::this_thread::sleep_for(1600ms);
+  broken = "frame.0002.exr";
+  touch();
+  EXPECT_EQ(refusal(), ErrorKind::timeout);
+  std::this_thread::sleep_for(1600ms);
+  EXPECT_EQ(refusal(), ErrorKind::io);
 }
 
 }  // namespace

@@ -204,6 +204,7 @@ TEST_F(ServiceTest, ADeletedJobLeavesNeitherStatesNorALineOfTheJournal) {
     for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
     worker.say(LeaseRequest{1});
     worker.expect<NoWork>();
+    EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
     EXPECT_THAT(ask<JobList>(service.endpoint(), DeleteJob{id.hex()}).jobs, SizeIs(0));
     EXPECT_EQ(refused(service.endpoint(), ShowJob{id.hex()}).kind, ErrorKind::bad_input);
     EXPECT_EQ(count_blobs(store()), 0u);

@@ -27,5 +27,16 @@ TEST(FolderToken, ATokenStaysAndTellsItsFolder) {
   }
 }
 
+TEST(FolderToken, ALineMayStandAfterIt) {
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "line" / "token";
+  ASSERT_TRUE(write_token(file, "abc", "2-5,9"));
+  EXPECT_EQ(read_after_token(file, "abc").value(), "2-5,9");
+  EXPECT_TRUE(expect_token(file, "abc"));
+  EXPECT_FALSE(expect_token(file, "ab"));
+  EXPECT_FALSE(expect_token(file, "abc\n"));
+  ASSERT_TRUE(write_token(file, "abc"));
+  EXPECT_EQ(read_after_token(file, "abc").value(), "");
+}
+
 }  // namespace
 }  // namespace baton
