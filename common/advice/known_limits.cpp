@@ -82,7 +82,7 @@ std::string in_words(const KnownLimit& limit, double turn_deg) {
   const std::string_view method = traits(limit.method).name;
   const std::string what = fmt::format(
       "`{}`{} {}", method, limit.never_refreshed ? " with refreshEvery 0" : "", limit.verdict);
-  const std::string known = fmt::format("{} (case {} of docs/lab/stability.md); `pool` holds",
+  const std::string known = fmt::format("{} (case {} of docs/lab/stability.md); `pool` does not",
                                         gloss_word(limit), limit.test_case);
   switch (limit.light) {
     case Light::turns:
