@@ -17,8 +17,8 @@ constexpr double kColorBytes = 3.2;
 /// The errors of a few pixels.
 constexpr double kErrorBytes = 0.1;
 /// What a pixel takes in a state of `pool` in the end, with its share of its block's memory, when
-/// all bins that rays reach are known; and the number of shadow rays of a pixel after which it takes
-/// half of that.
+/// all bins that rays reach are known; and the number of shadow rays of a pixel after which it
+/// takes half of that.
 constexpr double kMemoryBytes = 33, kHalfMemoryRays = 13;
 /// A sample of the first pass, and how many of a pixel's are stored: those of pixels near a
 /// shadow's border.
