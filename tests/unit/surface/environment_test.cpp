@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -222,6 +223,7 @@ TEST(Environment, ACappedShareIsLeftToWhatIsNoLamp) {
       const double power = plain.total_power(), mean = power / (4 * kPiDouble);
       const double capped_power =
           EnvironmentMap(capped(image, mean), filter, 1, false).total_power();
+      const double brightest = *std::ranges::max_element(image.rgb);
       EXPECT_EQ(map.total_power(), power);
       for (int j = 0; j < image.height; ++j) {
         for (int i = 0; i < image.width; ++i) {
@@ -230,7 +232,9 @@ TEST(Environment, ACappedShareIsLeftToWhatIsNoLamp) {
           const double light = (double{rgb[0]} + rgb[1] + rgb[2]) / 3;
           const double expected = (1 - double{kCapped}) * light / power +
                                   kCapped * std::min(light, mean) / capped_power;
-          ASSERT_NEAR(map.evaluate(w).density / expected, 1, 2e-3) << i << ", " << j;
+          // Beside a sun a float's rounding of the place tells.
+          const double slack = filter == MapFilter::nearest ? 0 : 2e-6 * brightest / power;
+          ASSERT_NEAR(map.evaluate(w).density, expected, 1e-4 * expected + slack) << i << ", " << j;
           ASSERT_EQ(map.evaluate(w).g, plain.evaluate(w).g);
         }
       }
