@@ -5,9 +5,10 @@ import os
 import subprocess
 from pathlib import Path
 
+import chaos_witness as witness
 from chaos import run
 from chaos_disk import PowerCut, enter_namespace
-from farm import check, check_equal, run_tests
+from farm import Fault, check, check_equal, run_tests
 from jobs import make_job, write_job
 
 NUM_FAULTS, SEED = 25, 1
@@ -27,6 +28,32 @@ def a_power_cut_sees_what_it_might_take(programs, folder):
     check_equal(sorted(name for name in named if name.endswith(".exr")), sorted(map(str, (folder / "frames").glob("*.exr"))),
                 "frames that got their names")
     check(not [name for name in power.at_risk() if name.endswith(".exr")], "a frame had its name before it was on the disk")
+
+
+def a_lease_that_is_taken_is_seen(_programs, _folder):
+    """By the witness, unless something that it knows has taken it."""
+    def seen(ms, kind, worker=1, version="aa", attempt=1, epoch=1):
+        return witness.Seen(ms, worker, kind, (version, witness.RENDER, 0, 0), (attempt, epoch), ())
+
+    def is_told(messages, returns=(), struck_ms=(), epochs=((0, 1),), ends=()):
+        try:
+            witness.check_nothing_revoked(messages, returns, struck_ms, epochs, ends, {"aa": "0123", "bb": "4567"})
+        except Fault:
+            return True
+        return False
+
+    taken = [seen(1000, "LeaseGrant"), seen(2600, "LeaseRevoke")]
+    check(is_told(taken), "nothing has taken it")
+    check(not is_told(taken[:1] + [seen(1500, "LeaseGrant", worker=2, attempt=2)] + taken[1:]), "another worker has it")
+    for what, excused, not_excused in [("returns", [(2000, 1)], [(2000, 2)]), ("struck_ms", [2000], [500]),
+                                       ("epochs", [(2500, 2)], [(2700, 2)]), ("ends", [("01", 2000)], [("45", 2000)]),
+                                       ("ends", [("01", 1000)], [("01", 500)])]:
+        check(not is_told(taken, **{what: excused}), f"{what} {excused} have taken it")
+        check(is_told(taken, **{what: not_excused}), f"{what} {not_excused} have not taken it")
+    unknown = [seen(1000, "LeaseGrant", version="cc"), seen(2600, "LeaseRevoke", version="cc")]
+    check(not is_told(unknown, ends=[("45", 2000)]), "a version whose submission was not answered may be of any job")
+    log = "12:00:01.500 [info] job 0123abcd: frames of another job take the place of its own\n12:00:02 [info] job 45: paused\n"
+    check_equal([job for job, _ in witness.superseded(log)], ["0123abcd"], "versions that have ended")
 
 
 def every_frame_is_right_after_random_faults(programs, folder):
