@@ -14,7 +14,7 @@ namespace {
 // Measured sizes, in bytes a pixel that sees a surface: docs/lab/store.md has the table.
 /// One of R, G, B; also in a sky.
 constexpr double kColorBytes = 3.2;
-/// The errors of a few pixels.
+/// The errors of a few pixels, where a single round tells them.
 constexpr double kErrorBytes = 0.1;
 /// What a pixel takes in a state of `pool` in the end, with its share of its block's memory, when
 /// all bins that rays reach are known; and the number of shadow rays of a pixel after which it
@@ -53,7 +53,9 @@ double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
     if (why_empty(aov, job).empty()) bytes += surface_share * film_bytes(aov, equal_weights);
   }
   if (has_catcher(job)) bytes += 3 * kColorBytes * surface_share;
-  return bytes + (tells_noise(job) ? kErrorBytes : 0);
+  if (!tells_noise(job)) return bytes;
+  const bool of_all = std::int64_t{job.quality.rounds} * job.quality.sweeps > 1;
+  return bytes + (of_all ? kColorBytes * surface_share : kErrorBytes);
 }
 
 /// Bytes of a pixel in a packed state after steps [0, end), on average.
