@@ -14,22 +14,22 @@ using testing::IsEmpty;
 
 constexpr TaskWatch::TimePoint kStart{};
 
-LeaseId lease(std::int32_t tile) { return {Digest{1, 2}, {TaskKind::render, 0, tile}, 1, 1}; }
+LeaseId watched_lease(std::int32_t tile) { return {Digest{1, 2}, {TaskKind::render, 0, tile}, 1, 1}; }
 
 TEST(TaskWatch, ATaskPastItsDeadlineIsNamedOnce) {
   TaskWatch watch;
-  const TaskWatch::Mark quick(watch, lease(1), kStart + 10s);
-  const TaskWatch::Mark slow(watch, lease(2), kStart + 20s);
+  const TaskWatch::Mark quick(watch, watched_lease(1), kStart + 10s);
+  const TaskWatch::Mark slow(watch, watched_lease(2), kStart + 20s);
   EXPECT_THAT(watch.take_overdue(kStart + 10s), IsEmpty());
-  EXPECT_THAT(watch.take_overdue(kStart + 11s), ElementsAre(lease(1)));
+  EXPECT_THAT(watch.take_overdue(kStart + 11s), ElementsAre(watched_lease(1)));
   EXPECT_THAT(watch.take_overdue(kStart + 12s), IsEmpty());
-  EXPECT_THAT(watch.take_overdue(kStart + 21s), ElementsAre(lease(2)));
+  EXPECT_THAT(watch.take_overdue(kStart + 21s), ElementsAre(watched_lease(2)));
 }
 
 TEST(TaskWatch, ATaskThatEndedIsForgotten) {
   TaskWatch watch;
   std::optional<TaskWatch::Mark> mark;
-  mark.emplace(watch, lease(1), kStart + 10s);
+  mark.emplace(watch, watched_lease(1), kStart + 10s);
   mark.reset();
   EXPECT_THAT(watch.take_overdue(kStart + 1h), IsEmpty());
   EXPECT_FALSE(watch.is_stuck(kStart + 1h));
@@ -37,7 +37,7 @@ TEST(TaskWatch, ATaskThatEndedIsForgotten) {
 
 TEST(TaskWatch, ATaskThatDoesNotStopIsStuckWhenPatienceEnds) {
   TaskWatch watch;
-  const TaskWatch::Mark mark(watch, lease(1), kStart + 10s);
+  const TaskWatch::Mark mark(watch, watched_lease(1), kStart + 10s);
   EXPECT_FALSE(watch.is_stuck(kStart + 10s + TaskWatch::kStopPatience));
   EXPECT_TRUE(watch.is_stuck(kStart + 11s + TaskWatch::kStopPatience));
 }
