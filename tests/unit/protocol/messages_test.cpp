@@ -133,7 +133,7 @@ TEST(Messages, TheirBytesAreThoseOfTheVersion) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "d78bd5edb945b42ec0b74e19cfa8ca83");
+  EXPECT_EQ(digest_of(all).hex(), "a569ae79bda3dde0e4f623bc04f8644d");
 }
 
 TEST(Messages, MembersArriveWhereTheyWereSent) {

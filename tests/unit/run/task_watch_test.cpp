@@ -14,7 +14,9 @@ using testing::IsEmpty;
 
 constexpr TaskWatch::TimePoint kStart{};
 
-LeaseId watched_lease(std::int32_t tile) { return {Digest{1, 2}, {TaskKind::render, 0, tile}, 1, 1}; }
+LeaseId watched_lease(std::int32_t tile) {
+  return {Digest{1, 2}, {TaskKind::render, 0, tile}, 1, 1};
+}
 
 TEST(TaskWatch, ATaskPastItsDeadlineIsNamedOnce) {
   TaskWatch watch;
