@@ -62,9 +62,9 @@ struct FramesTest : ServiceTest {
   JobDetail finish(const std::string& endpoint, FakeWorker& worker, const Digest& id) {
     for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
          std::chrono::steady_clock::now() < deadline;) {
+      sync(worker);  // what it has said is known
       const JobDetail detail = show(endpoint, id);
       if (detail.summary.status != JobStatus::running) return detail;
-      worker.say(Heartbeat{});
       if (detail.summary.tasks_done == detail.summary.tasks_total) continue;
       worker.do_one_task();
       sync(worker);
