@@ -65,9 +65,11 @@ TEST(FrameQuality, NoiseAsShownFollowsTheCurveOfTheDisplay) {
 
   // What is far past white looks clean.
   FilmTile bright = noisy;
-  for (std::size_t c = 0; c < 3; ++c) std::fill_n(bright.plane(c), 32, 0.0f);
-  for (std::size_t c = 0; c < 3; ++c) std::fill_n(bright.plane(c) + 32, 32, 100.0f);
-  std::fill_n(bright.plane(4), 32, 0.0f);
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::fill_n(bright.plane(c), 48, 0.0f);
+    std::fill_n(bright.plane(c) + 48, 16, 100.0f);
+  }
+  std::fill_n(bright.plane(4), 48, 0.0f);
   EXPECT_NEAR(judge_frame(bright).noise_shown, 0, 1e-6);
 }
 
