@@ -185,7 +185,7 @@ struct FrameQuality {
   /// FrameNoise::relative() (common/image/noise.h).
   float noise = 0;
   float noise_error = 0;  ///< standard error of `noise`, as a share
-  float noise_shown = 0;  ///< noise_as_shown() (common/image/noise.h), [0, .5]
+  float noise_shown = 0;  ///< noise_as_shown(), [0, .5]
   /// In the measure of quality.noiseThreshold (common/image/noise.h); 0: not told.
   float cycles_noise = 0;
   float mean = 0;    ///< radiance, over pixels and the three

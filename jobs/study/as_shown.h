@@ -12,11 +12,11 @@ namespace baton {
 /// highlight counts no more than white and dark places count as the eye has them.
 struct ErrorAsShown {
   double mse = 0;              ///< over pixels and R, G, B
-  double darkest_mse = 0;      ///< of the quarter of the pixels that is darkest in the reference
-  double worst_block_mse = 0;  ///< of a square of kBlockPx pixels' side with 64 counted pixels
+  double darkest_mse = 0;      ///< of the reference's darkest quarter
+  double worst_block_mse = 0;  ///< of squares with 64 such pixels
   /// 99.9th percentile over pixels of the root of a pixel's squared error.
   double percentile_99_9 = 0;
-  double black = 0;  ///< share of pixels that are 0 where the reference is not
+  double black = 0;  ///< share that is 0 and should not be
 };
 
 /// The truth as people see it, in two halves of independent noise.

@@ -26,7 +26,7 @@ struct PixelRays {
   Column<float> r, g, b;     ///< what a free ray brings
   Column<float> visibility;  ///< share of Lns of a free ray
   Column<std::uint8_t> site;
-  Column<std::uint16_t> tag;  ///< RayTag, of methods that remember their rays
+  Column<std::uint16_t> tag;  ///< RayTag, where rays are remembered
   Value constant;
   LightVariance light_variance;  ///< variance of this frame's candidates
 

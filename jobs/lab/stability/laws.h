@@ -20,7 +20,7 @@ struct Numbers {
   /// late: RMSE of a pixel of the picture as shown (common/image/as_shown.h), at the exposure of
   /// the exact answer of each frame.
   double noise_shown = 0;
-  double black = 0;  ///< late: share of values that are 0 where the exact answer is not
+  double black = 0;  ///< late: share of wrong zeros
   /// Noise in the two frames from the light's jump on.
   double noise_after = 0;
   /// late: 99.9th percentile of a pixel's error / mean radiance.

@@ -44,7 +44,7 @@ struct FrameErrors {
   std::vector<double> ratio_of_run;  ///< (renderings) mean
   std::vector<double> error_of_run;  ///< (renderings) mean
   double shown_square = 0;           ///< mean squared error as shown
-  double black = 0;                  ///< share of values that are 0 and should not be
+  double black = 0;                  ///< share of wrong zeros
   double mean_square() const {
     double sum = 0;
     for (const double e : error) sum += e * e;
