@@ -27,11 +27,15 @@ class Patience {
 /// written be seen here later. What ends with such an error is done again, and what it is done for
 /// is not. look() returns a Result; what it does may be done several times.
 template <class Look>
-auto patiently(const Look& look, const std::stop_token& stop = {}) {
-  Patience patience(stop);
+auto patiently(const Look& look, Patience& patience) {
   auto result = look();
   while (!result && patience.wait_after(result.error())) result = look();
   return result;
+}
+template <class Look>
+auto patiently(const Look& look, const std::stop_token& stop = {}) {
+  Patience patience(stop);
+  return patiently(look, patience);
 }
 
 }  // namespace baton

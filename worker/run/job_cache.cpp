@@ -39,15 +39,40 @@ std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
                                     plate_bytes);
 }
 
-/// How files stand; nullopt: one is not there. Errors: one cannot be looked at, or is none.
-Result<std::vector<std::optional<FileStamp>>> stamps_of(const std::vector<AssetDigest>& files) {
-  std::vector<std::optional<FileStamp>> stamps;
+/// The files of a job, once each is seen to be the one that it was submitted with. Errors: those of
+/// all files together; io where looking again helps.
+Result<std::vector<KnownAsset>> look_at(const std::vector<AssetDigest>& files) {
+  std::vector<KnownAsset> known;
+  std::string faults;
+  ErrorKind kind = ErrorKind::io;
+  Patience patience;  // of all: a folder that is away is waited for once
   for (const AssetDigest& file : files) {
-    BATON_ASSIGN(const std::optional<FileStamp> stamp,
-                 patiently([&] { return stamp_of(file.path); }));
-    stamps.push_back(stamp);
+    const auto look = [&]() -> Result<KnownAsset> {
+      BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(file.path));
+      BATON_TRY(verify_assets({file}));  // which says where there is none
+      return KnownAsset{file, stamp.value_or(FileStamp())};
+    };
+    const Result<KnownAsset> seen = patiently(look, patience);
+    if (seen) {
+      known.push_back(*seen);
+      continue;
+    }
+    if (seen.error().kind != ErrorKind::io) kind = seen.error().kind;
+    faults += (faults.empty() ? "" : "\n") + seen.error().message;
   }
-  return stamps;
+  if (!faults.empty()) return Error{kind, faults};
+  return known;
+}
+
+/// Error (io): a file has changed since it was looked at.
+Status expect_unchanged(const std::vector<KnownAsset>& files) {
+  for (const KnownAsset& known : files) {
+    BATON_ASSIGN(const std::optional<FileStamp> stamp,
+                 patiently([&] { return stamp_of(known.file.path); }));
+    if (stamp != known.stamp)
+      return Error{ErrorKind::io, known.file.path + ": changes while it is read"};
+  }
+  return {};
 }
 
 /// What the worker's memory leaves to the job's scene. Error: nothing.
@@ -88,16 +113,12 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
   }
 
   // What changes while it is read is looked at again, and then told of.
-  BATON_ASSIGN(const auto before, stamps_of(here.assets));
-  BATON_TRY(verify_assets(here.assets));
-  for (std::size_t i = 0; i < before.size(); ++i)
-    loaded->assets.push_back({here.assets[i], before[i].value_or(FileStamp())});
+  BATON_ASSIGN(loaded->assets, look_at(here.assets));
   BATON_ASSIGN(const std::uint64_t room, room_for_scene(here.job, machine));
-  BATON_ASSIGN(const auto assets, shelf.get(here.job, loaded->assets, machine.memory, room));
-  BATON_ASSIGN(const auto after, stamps_of(here.assets));
-  if (after != before)
-    return Error{ErrorKind::io,
-                 "the files of job '" + here.job.name + "' change while they are read"};
+  BATON_ASSIGN(const auto assets, patiently([&] {
+                 return shelf.get(here.job, loaded->assets, machine.memory, room);
+               }));
+  BATON_TRY(expect_unchanged(loaded->assets));
   BATON_ASSIGN(loaded->context,
                make_render_context(here.job, parsed.picture, assets, machine.memory));
   loaded->scene_bytes = assets->size_bytes();

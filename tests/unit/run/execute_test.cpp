@@ -338,6 +338,38 @@ TEST_F(ExecuteTest, ASceneThatIsWrongIsLoadedOnce) {
   EXPECT_EQ(loads, 2);
 }
 
+// Of a file that is away for a moment the first look is repeated, and not the loading of the job.
+TEST_F(ExecuteTest, AMeshThatComesLateIsWaitedFor) {
+  const std::string document = make_job_document(job_).value();
+  const std::string mesh = folder_ + "tetrahedron.off", away = folder_ + "away.off";
+  std::filesystem::rename(mesh, away);
+  int waits = 0;
+  const test::LogListener listener([&](const std::string& line) {
+    EXPECT_THAT(line, testing::HasSubstr(mesh));
+    if (++waits == 1) std::filesystem::rename(away, mesh);
+  });
+  AssetShelf shelf;
+  const Result<LoadedJobPtr> loaded = load_job_document({digest_of(document), document}, {}, shelf);
+  EXPECT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(waits, 1);
+}
+
+// All that is wrong is said at once, after one wait.
+TEST_F(ExecuteTest, FilesThatAreAwayAreNamedTogether) {
+  const std::string document = make_job_document(job_).value();
+  for (const char* const name : {"tetrahedron.off", "map.exr"})
+    std::filesystem::remove(folder_ + name);
+  int waits = 0;
+  const test::LogListener listener([&](const std::string&) { ++waits; });
+  AssetShelf shelf;
+  const Result<LoadedJobPtr> loaded = load_job_document({digest_of(document), document}, {}, shelf);
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().kind, ErrorKind::io);
+  EXPECT_THAT(loaded.error().message, testing::AllOf(testing::HasSubstr("tetrahedron.off: "),
+                                                     testing::HasSubstr("map.exr: ")));
+  EXPECT_EQ(waits, 1);
+}
+
 // The mesh has become a folder: that is said, and not that files change.
 TEST_F(ExecuteTest, AFileThatCannotBeLookedAtIsSaid) {
   const std::string document = make_job_document(job_).value();
