@@ -81,7 +81,7 @@ def the_report_needs_no_other_file(programs, folder):
                      processor.split(": ", 1)[1].strip()]:
         check(expected in report, f"report.html: expected {expected}")
     shown = re.sub("<details>.*?</details>", "", report, flags=re.DOTALL)
-    check_equal(shown.count("<svg"), 5, "charts that are not folded")
+    check_equal(shown.count("<svg"), 6, "charts that are not folded")
     check(report.count("<svg") > 15, "the others are gone")
     for forbidden in ["src=\"http", "href=", "<script"]:
         check(forbidden not in report, f"report.html holds {forbidden}")

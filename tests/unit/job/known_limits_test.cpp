@@ -51,8 +51,9 @@ TEST(KnownLimits, AreTheVerdictsOfTheStabilitySuite) {
   for (const KnownLimit& limit : known_limits()) {
     const std::string key = std::string(limit.test_case) + "," + std::string(limit.subject);
     EXPECT_EQ(verdicts[key], limit.verdict) << key;
-    EXPECT_EQ(verdicts[std::string(limit.test_case) + ",pool"], "holds")
-        << "what is offered instead";
+    const std::string of_pool = verdicts[std::string(limit.test_case) + ",pool"];
+    EXPECT_NE(of_pool, limit.verdict) << "what is offered instead";
+    EXPECT_NE(of_pool, "fails");
     if (limit.light == KnownLimit::Light::turns) {
       EXPECT_NE(std::string(limit.test_case).find("turn-"), std::string::npos);
       EXPECT_EQ(std::stod(std::string(limit.test_case).substr(5)), limit.from_deg) << key;
