@@ -88,14 +88,15 @@ std::vector<FrameOverSeeds> repeat(JobSpec job) {
   return frames;
 }
 
-void expect_truth(const JobSpec& job, double limit = kLimit) {
+void expect_truth(const JobSpec& job, double least = 1 - kLimit, double most = 1 + kLimit) {
   const std::vector<FrameOverSeeds> frames = repeat(job);
   for (const FrameOverSeeds* frame : {&frames.front(), &frames.back()}) {
     const double error = frame->error_share();
     std::printf("  %-13s %d sites, told %.4f, is %.4f: %.3f +- %.3f\n",
                 std::string(traits(job.sampling.method).name).c_str(), job.image.sites,
                 frame->told(), frame->truth(), frame->told() / frame->truth(), error);
-    EXPECT_NEAR(frame->told() / frame->truth(), 1, limit);
+    EXPECT_GT(frame->told() / frame->truth(), least);
+    EXPECT_LT(frame->told() / frame->truth(), most);
   }
 }
 
@@ -122,8 +123,10 @@ TEST(ToldNoiseOf, RatioAndReferenceIsTrue) {
 }
 
 /// Rounds and sweeps, whose scatter tells the noise of what is seen: over seeds that choose the
-/// sites, too. Standard errors are below 1 %, but sites that are stratified over rounds make the
-/// told noise of edges too large.
+/// sites, too. Standard errors are below 1 %. Where there are no edges it is within 15 %; of a
+/// lens, whose points are stratified, too, within 35 %. A box
+/// before black, whose noise is nearly all that of edges, is told too large, since sites are
+/// stratified over the rounds, and never too small.
 struct Scatter {
   Method method;
   int sites, rounds, sweeps;
@@ -132,13 +135,19 @@ struct Scatter {
 class ToldNoiseByScatter : public testing::TestWithParam<Scatter> {};
 TEST_P(ToldNoiseByScatter, IsTrue) {
   const Scatter& of = GetParam();
-  for (const Moves moves : {Moves::light, Moves::camera}) {
-    JobSpec job = noise_job(of.method, of.sites, moves);
+  for (const bool has_edges : {false, true}) {
+    JobSpec job = noise_job(of.method, of.sites, Moves::light);
+    if (!has_edges) {
+      job.image.width = 24;
+      job.image.height = 16;
+      job.camera = {
+          .position = {-1.5f, 2, 1}, .look_at = {-0.75f, 0, -1.2f}, .vertical_fov_deg = 1};
+    }
     job.image.site_seed = 0;
     job.quality.rounds = of.rounds;
     job.quality.sweeps = of.sweeps;
     if (of.lens) job.camera.aperture = 0.2f;
-    expect_truth(job, 0.15);
+    expect_truth(job, 0.85, has_edges ? 1.8 : of.lens ? 1.35 : 1.15);
   }
 }
 INSTANTIATE_TEST_SUITE_P(
