@@ -51,17 +51,14 @@ float cycles_noise(const FilmTile& film) {
     std::size_t count = 0;
     double mean() const { return sum / static_cast<double>(count); }
   };
-  const auto along = [](std::int32_t size) { return (size + kNoiseBlockPx - 1) / kNoiseBlockPx; };
-  const std::int32_t columns = along(film.rect.width());
-  std::vector<Square> squares(static_cast<std::size_t>(columns) * along(film.rect.height()));
+  const NoiseBlocks blocks(film.rect);
+  std::vector<Square> squares(blocks.count());
   Square all;
   for (std::size_t i = 0; i < film.num_pixels(); ++i) {
     const double grey = colors.grey(i);
     if (error[i] == kErrorUnknown) return 0;
     if (!(error[i] >= 0) || !std::isfinite(error[i]) || !std::isfinite(grey)) continue;
-    const auto x = static_cast<std::int32_t>(i) % film.rect.width() / kNoiseBlockPx;
-    const auto y = static_cast<std::int32_t>(i) / film.rect.width() / kNoiseBlockPx;
-    for (Square* const square : {&all, &squares[static_cast<std::size_t>(y * columns + x)]}) {
+    for (Square* const square : {&all, &squares[blocks.of(i)]}) {
       square->sum += cycles_noise_squared(double{error[i]}, grey);
       ++square->count;
     }

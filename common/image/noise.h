@@ -4,8 +4,14 @@
 #include <cstddef>
 
 #include "common/image/film_tile.h"
+#include "common/math/pixel_blocks.h"
 
 namespace baton {
+
+/// The squares of the picture that errors are judged by, so that a noisy corner counts; and the
+/// number of counted pixels from which on one is judged.
+using NoiseBlocks = PixelBlocksOf<16>;
+inline constexpr std::size_t kFewestInNoiseBlock = 64;
 
 /// The colours of a film; false: it has not all of them.
 struct FilmColors {
@@ -63,12 +69,10 @@ inline constexpr float kNoSurface = -2, kErrorUnknown = -1;
 double cycles_noise_squared(double variance, double grey);
 
 /// What quality.noiseThreshold is held against: the rms of that measure over the pixels of each
-/// square of kNoiseBlockPx on the film's grid that has kFewestInNoiseBlock surfaces, and of these
-/// squares the one that at most 1 % exceed. Where no square has as many, all pixels are one. 0: not
+/// square of NoiseBlocks that has kFewestInNoiseBlock surfaces, and of these squares the one that
+/// at most 1 % exceed. Where no square has as many, all pixels are one. 0: not
 /// told, as of a film of a single round, whose probes are too few to say it of a corner.
 float cycles_noise(const FilmTile& film);
-inline constexpr int kNoiseBlockPx = 16;
-inline constexpr std::size_t kFewestInNoiseBlock = 64;
 
 /// The noise of a film as people see it: the rms over its probes of half the distance of
 /// grey + sigma and grey - sigma, both as shown (common/image/as_shown.h) at the exposure of the

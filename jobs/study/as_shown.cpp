@@ -5,20 +5,13 @@
 
 #include "common/base/check.h"
 #include "common/image/as_shown.h"
-#include "jobs/study/measured_frame.h"
+#include "common/image/noise.h"
+#include "jobs/study/intervals.h"
 
 namespace baton {
 namespace {
 
-constexpr float kWhole = 0.999f;            ///< coverage above which a pixel counts
-constexpr std::size_t kFewestInBlock = 64;  ///< pixels from which on a square is judged
-
-double value_at(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
+constexpr float kWhole = 0.999f;  ///< coverage above which a pixel counts
 
 struct Mean {
   double sum = 0;
@@ -33,14 +26,15 @@ struct Mean {
 }  // namespace
 
 ReferenceAsShown::ReferenceAsShown(const RgbImage& a, const RgbImage& b,
-                                   const std::vector<float>& coverage)
-    : num_blocks_(baton::num_blocks(a.width, a.height)) {
+                                   const std::vector<float>& coverage) {
   BATON_CHECK(a.rgb.size() == b.rgb.size() && a.rgb.size() == 3 * coverage.size());
+  const NoiseBlocks blocks({0, 0, a.width, a.height});
+  num_blocks_ = blocks.count();
   std::vector<float> mean;
   for (std::size_t i = 0; i < coverage.size(); ++i) {
     if (!(coverage[i] > kWhole)) continue;
     pixels_.push_back(i);
-    block_.push_back(block_of(i, a.width));
+    block_.push_back(blocks.of(i));
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) mean.push_back(0.5f * (a.rgb[k] + b.rgb[k]));
   }
   exposure_ = exposure_as_shown(mean);
@@ -65,7 +59,7 @@ ReferenceAsShown::ReferenceAsShown(const RgbImage& a, const RgbImage& b,
     is_black_.push_back(is_black ? 1 : 0);
   }
   own_mse_ = own.value();
-  const double dark = value_at(brightness, 0.25);
+  const double dark = quantile(brightness, 0.25);
   for (const double sum : brightness) is_dark_.push_back(sum <= dark ? 1 : 0);
 }
 
@@ -93,10 +87,10 @@ ErrorAsShown ReferenceAsShown::error_of(const RgbImage& test) const {
   ErrorAsShown error{.mse = all.value(),
                      .darkest_mse = darkest.value(),
                      .worst_block_mse = 0,
-                     .percentile_99_9 = value_at(std::move(deviation), 0.999),
+                     .percentile_99_9 = quantile(std::move(deviation), 0.999),
                      .black = black.value()};
   for (const Mean& block : blocks) {
-    if (block.count >= kFewestInBlock)
+    if (block.count >= kFewestInNoiseBlock)
       error.worst_block_mse = std::max(error.worst_block_mse, block.value());
   }
   return error;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "common/image/noise.h"
 #include "jobs/study/svg_text.h"
 
 namespace baton {
@@ -191,7 +192,7 @@ std::string auto_html(const Study& study, const StudyResults& results) {
                     "what the best fixed method for each square of {} pixels would gain over the "
                     "best one for the whole image, chosen on one half of the seeds and judged on "
                     "the other.</p>\n",
-                    kBlockPx);
+                    NoiseBlocks::kSide);
 }
 
 }  // namespace baton

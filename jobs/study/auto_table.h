@@ -16,10 +16,10 @@ struct AutoRow {
 };
 std::vector<AutoRow> compare_auto(const Study& study, const StudyResults& results);
 
-/// What the best choice of a fixed method for each square of kBlockPx, instead of one for the whole
-/// image, would make of the efficiency: chosen on one half of the seeds, measured on the other, and
-/// the other way round. 1: nothing gained. NaN with fewer than two fixed methods or two seeds.
-/// budget: name of the cells' budget.
+/// What the best choice of a fixed method for each square of NoiseBlocks::kSide, instead of one for
+/// the whole image, would make of the efficiency: chosen on one half of the seeds, measured on the
+/// other, and the other way round. 1: nothing gained. NaN with fewer than two fixed methods or two
+/// seeds. budget: name of the cells' budget.
 double block_headroom(const Study& study, const StudyResults& results, std::size_t scene,
                       const std::string& budget);
 

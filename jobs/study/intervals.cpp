@@ -58,12 +58,15 @@ Interval ratio_interval(std::span<const double> above, std::span<const double> b
   return interval_of(mean_of(above) / mean_of(below), std::move(ratios));
 }
 
-double median(std::span<const double> values) {
+double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0;
-  std::vector<double> sorted(values.begin(), values.end());
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return *middle;
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+double median(std::span<const double> values) {
+  return quantile({values.begin(), values.end()}, 0.5);
 }
 
 }  // namespace baton

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 namespace baton {
 
@@ -16,6 +17,9 @@ Interval mean_interval(std::span<const double> values);
 /// Ratio of the means of two independent sets of renderings, resampled apart. value: NaN when the
 /// second mean is not positive.
 Interval ratio_interval(std::span<const double> above, std::span<const double> below);
+
+/// The value at a share of the sorted ones, [0, 1]; 0 without any.
+double quantile(std::vector<double> values, double share);
 
 /// The middle value; 0 without any.
 double median(std::span<const double> values);

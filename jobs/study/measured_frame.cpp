@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/image/contact_sheet.h"
+#include "common/image/noise.h"
 #include "jobs/study/flip.h"
 
 namespace baton {
@@ -53,20 +54,6 @@ Result<MeasuredFrame> read_measured_frame(const std::filesystem::path& path) {
   return frame;
 }
 
-std::size_t block_of(std::size_t index, int width) {
-  const auto x = static_cast<int>(index % static_cast<std::size_t>(width));
-  const auto y = static_cast<int>(index / static_cast<std::size_t>(width));
-  const int columns = (width + kBlockPx - 1) / kBlockPx;
-  return static_cast<std::size_t>(y / kBlockPx * columns + x / kBlockPx);
-}
-
-std::size_t num_blocks(int width, int height) {
-  const auto along = [](int size) {
-    return static_cast<std::size_t>((size + kBlockPx - 1) / kBlockPx);
-  };
-  return along(width) * along(height);
-}
-
 std::optional<std::string> reference_fault(const Reference& reference) {
   constexpr std::size_t kFewestPixels = 64;
   constexpr double kTwice = 2;
@@ -83,13 +70,14 @@ Reference make_reference(MeasuredFrame a, MeasuredFrame b) {
   Reference reference;
   const std::size_t num_pixels = a.coverage.size();
   reference.mean = a.image;
+  const NoiseBlocks blocks({0, 0, a.image.width, a.image.height});
   double sum = 0, sum_squares = 0, sum_relative = 0, sum_variance = 0, sum_lns = 0;
   for (std::size_t i = 0; i < num_pixels; ++i) {
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)
       reference.mean.rgb[k] = 0.5f * (a.image.rgb[k] + b.image.rgb[k]);
     if (!(a.coverage[i] > 0)) continue;
     reference.lit_pixels.push_back(i);
-    reference.block.push_back(block_of(i, a.image.width));
+    reference.block.push_back(blocks.of(i));
     sum_lns += 0.5 * (a.lns[i] + b.lns[i]);
     sum_variance += 0.25 * (a.variance[i] + b.variance[i]);
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
@@ -100,7 +88,7 @@ Reference make_reference(MeasuredFrame a, MeasuredFrame b) {
       sum_relative += relative * relative;
     }
   }
-  reference.num_blocks = num_blocks(a.image.width, a.image.height);
+  reference.num_blocks = blocks.count();
   const auto count = static_cast<double>(std::max<std::size_t>(reference.lit_pixels.size(), 1));
   reference.mean_radiance = sum / (3 * count);
   reference.mse = sum_squares / (3 * count);

@@ -22,12 +22,6 @@ struct MeasuredFrame {
   std::vector<float> variance;
 };
 
-/// Side of the squares that images are divided into, in pixels; those at the border are cut.
-inline constexpr int kBlockPx = 16;
-/// The square of pixel `index` of an image of that width, and the number of squares.
-std::size_t block_of(std::size_t index, int width);
-std::size_t num_blocks(int width, int height);
-
 /// Reads a frame. Errors name the file: missing, not an EXR, without R, G, B, A or lns.
 Result<MeasuredFrame> read_measured_frame(const std::filesystem::path& path);
 

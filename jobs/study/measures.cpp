@@ -6,17 +6,10 @@
 #include "common/base/check.h"
 #include "common/image/contact_sheet.h"
 #include "jobs/study/flip.h"
+#include "jobs/study/intervals.h"
 
 namespace baton {
 namespace {
-
-/// Value at a share of the sorted values; 0 without any.
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
-  return values[at];
-}
 
 double mean_over(const std::vector<float>& values, const std::vector<std::size_t>& pixels) {
   if (values.empty() || pixels.empty()) return 0;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/image/noise.h"
 #include "common/job/text/frame_range.h"
 #include "common/math/philox.h"
 #include "jobs/study/auto_table.h"
@@ -204,7 +205,7 @@ TEST(AutoTable, ChoosingBySquareGainsWhereMethodsDiffer) {
   StudyResults results = two_results(0.1);
   // Two squares of equally many pixels, methods of equal cost.
   Reference& reference = results.references[0][0];
-  reference.lit_pixels = {0, kBlockPx};
+  reference.lit_pixels = {0, NoiseBlocks::kSide};
   reference.block = {0, 1};
   reference.num_blocks = 2;
   results.runs = {runs({4, 4}, 1), runs({4, 4}, 1)};
@@ -217,12 +218,6 @@ TEST(AutoTable, ChoosingBySquareGainsWhereMethodsDiffer) {
   set_blocks(1, 3, 4);
   EXPECT_NEAR(block_headroom(study, results, 0, "16"), 1, 1e-9);
   EXPECT_TRUE(std::isnan(block_headroom(study, results, 0, "none")));
-}
-
-TEST(Measures, SquaresAreCutAtTheBorder) {
-  EXPECT_EQ(num_blocks(kBlockPx + 1, kBlockPx), 2u);
-  EXPECT_EQ(block_of(kBlockPx, kBlockPx + 1), 1u);
-  EXPECT_EQ(block_of(static_cast<std::size_t>((kBlockPx + 1) * kBlockPx), kBlockPx + 1), 2u);
 }
 
 TEST(ChartAxis, TicksAreDecadesOrRoundSteps) {

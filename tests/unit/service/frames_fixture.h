@@ -1,0 +1,81 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/store/folder_token.h"
+#include "coordinator/service/service.h"
+#include "tests/unit/service/fake_farm.h"
+
+namespace baton::testing_service {
+
+/// A file that begins so is a whole picture; the rest names the job that wrote it.
+inline constexpr std::string_view kPicture = "picture of ";
+
+struct FramesTest : ServiceTest {
+  std::atomic<int> num_read{0};
+  /// File name of a frame that gives an error when it is read.
+  std::atomic<const char*> broken = "";
+
+  void SetUp() override {
+    ServiceTest::SetUp();
+    options.disk.digest = [this](const fs::path& path) -> Result<Digest> {
+      if (path.filename() == broken.load())
+        return Error{ErrorKind::io, path.string() + ": cannot read: Input/output error"};
+      if (path.extension() == ".exr") ++num_read;
+      return digest_of_file(path);
+    };
+    options.disk.picture_writer = [](const fs::path& path) -> std::optional<std::string> {
+      const std::string text = read_text_file(path, 1 << 20).value();
+      if (!text.starts_with(kPicture)) return std::nullopt;
+      return text.substr(kPicture.size());
+    };
+  }
+
+  fs::path frame(int number) const {
+    return fs::path(job.output.directory) / ("frame.000" + std::to_string(number) + ".exr");
+  }
+  void put(int number, const std::string& text) const {
+    ASSERT_TRUE(write_file_atomic(frame(number), as_bytes_view(text)).ok());
+  }
+  fs::path mark(const Digest& id) const {
+    return fs::path(job.output.directory) / (".baton-" + id.short_hex());
+  }
+
+  /// Submits the job, has its folder marked, and does all but its last task.
+  Digest begin(const std::string& endpoint, FakeWorker& worker) {
+    const Digest id = ask<JobAccepted>(endpoint, SubmitJob{document}).version;
+    worker.hello();
+    worker.say(JobDocumentRequest{id});
+    EXPECT_FALSE(worker.expect<JobDocument>().token.empty());
+    for (int i = 0; i < kNumTasks - 1; ++i) worker.do_one_task();
+    sync(worker);
+    return id;
+  }
+  /// Does what there is, until the job has ended.
+  JobDetail finish(const std::string& endpoint, FakeWorker& worker, const Digest& id) {
+    for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
+         std::chrono::steady_clock::now() < deadline;) {
+      sync(worker);  // what it has said is known
+      const JobDetail detail = show(endpoint, id);
+      if (detail.summary.status != JobStatus::running) return detail;
+      if (detail.summary.tasks_done == detail.summary.tasks_total) continue;
+      worker.do_one_task();
+      sync(worker);
+    }
+    ADD_FAILURE() << "the job does not end";
+    return show(endpoint, id);
+  }
+  std::vector<FrameNumber> locked_frames(const std::string& endpoint, const Digest& id) {
+    return ask<ShownJob>(endpoint, ShowJob{id.hex()}).locked;
+  }
+  static void sync(FakeWorker& worker) {
+    worker.say(LeaseRequest{0});
+    worker.say(Heartbeat{});
+    worker.expect<Heartbeat>();
+  }
+};
+
+}  // namespace baton::testing_service

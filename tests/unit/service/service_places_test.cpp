@@ -1,0 +1,144 @@
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "tests/unit/service/frames_fixture.h"
+
+/// Pictures of others, or painted ones, in a frame's place.
+namespace baton {
+namespace {
+
+using namespace testing_service;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+/// Painted over, with the headers of the job that wrote the frame.
+TEST_F(FramesTest, APaintedFrameThatNamesItsJobIsKeptWithoutRestart) {
+  const RunningService service(options);
+  for (const std::string how : {"done", "failed", "cancelled", "unlocked"}) {
+    SCOPED_TRACE(how);
+    FakeWorker worker(service.endpoint(), store(), job, "w" + how);
+    const Digest id = begin(service.endpoint(), worker);
+    const std::string painted = std::string(kPicture) + id.hex();
+    if (how == "failed") put(2, painted);
+    if (how == "cancelled") ask<ShownJob>(service.endpoint(), CancelJob{id.hex()});
+    const JobStatus status = how == "cancelled"
+                                 ? JobStatus::cancelled
+                                 : finish(service.endpoint(), worker, id).summary.status;
+    EXPECT_EQ(status, how == "failed"      ? JobStatus::failed
+                      : how == "cancelled" ? JobStatus::cancelled
+                                           : JobStatus::done);
+    put(2, painted);
+    if (how == "unlocked") {
+      ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}});
+      ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+      ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}, /*off=*/true});
+    }
+    const Error refusal = refused(service.endpoint(), SubmitJob{document});
+    EXPECT_EQ(refusal.kind, ErrorKind::io);
+    EXPECT_THAT(refusal.message, HasSubstr("frame.0002.exr is not what a job has written"));
+    EXPECT_EQ(read_text_file(frame(2), 100).value(), painted);
+    ask<JobAccepted>(service.endpoint(), SubmitJob{document, true});
+    finish(service.endpoint(), worker, id);
+    EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
+    ask<JobList>(service.endpoint(), DeleteJob{id.hex()});
+    fs::remove_all(job.output.directory);
+    worker.say(WorkerGoodbye{});
+  }
+}
+
+/// Does all but the assembly of frame 2, which a worker of its own has.
+struct PlaceTest : FramesTest {
+  std::string picture = "picture of somebody";
+
+  LeaseId wait_for_frame_2(FakeWorker& worker) {
+    for (int i = 0; i < 20; ++i) {
+      worker.say(LeaseRequest{1});
+      const LeaseGrant grant = worker.expect<LeaseGrant>();
+      granted = grant.may_replace;
+      if (grant.lease.task == assemble_task(FrameIndex(1))) return grant.lease;
+      worker.say(worker.work(grant.lease));
+    }
+    ADD_FAILURE() << "frame 2 is not asked for";
+    return {};
+  }
+  void say_taken(FakeWorker& worker, const LeaseId& lease, const std::string& writer) const {
+    worker.say(LeaseReturn{lease, {}, {}, digest_of(picture), writer});
+  }
+  /// LeaseGrant::may_replace of the last grant.
+  std::vector<Digest> granted;
+};
+
+TEST_F(PlaceTest, ThePictureOfSomebodyElseStaysAndTheJobFails) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    put(2, picture);
+    const LeaseId lease = wait_for_frame_2(worker);
+    EXPECT_THAT(granted, SizeIs(0));
+    say_taken(worker, lease, "somebody");
+    const JobDetail detail = finish(service.endpoint(), worker, id);
+    EXPECT_EQ(detail.summary.status, JobStatus::failed);
+    EXPECT_THAT(detail.waits, HasSubstr("frame.0002.exr is not what a job has written"));
+    EXPECT_EQ(detail.summary.tasks_failed, 0u);
+    EXPECT_EQ(read_text_file(frame(2), 100).value(), picture);
+    EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message,
+                HasSubstr("frame.0002.exr is not what a job has written"));
+
+    // Somebody gives it up, and the coordinator ends before it is replaced.
+    ask<JobAccepted>(service.endpoint(), SubmitJob{document, true});
+  }
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  const LeaseId lease = wait_for_frame_2(worker);
+  EXPECT_THAT(granted, testing::Contains(digest_of(picture)));
+  worker.say(worker.work(lease));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+
+  // What was given up was that picture there, once.
+  put(2, picture);
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message,
+              HasSubstr("frame.0002.exr is not what a job has written"));
+}
+
+TEST_F(PlaceTest, OnceItIsGoneTheFrameIsMade) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  put(2, picture);
+  say_taken(worker, wait_for_frame_2(worker), {});
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::failed);
+  fs::remove(frame(2));
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
+}
+
+// A worker of a former version was late.
+TEST_F(PlaceTest, WhatAFormerJobHasLeftMayGo) {
+  const RunningService service(options);
+  JobSpec urgent = job;
+  urgent.priority = 7;
+  const Digest former =
+      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).version;
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  put(2, picture);
+  const LeaseId lease = wait_for_frame_2(worker);
+  say_taken(worker, lease, former.hex());
+  const LeaseId again = wait_for_frame_2(worker);
+  EXPECT_NE(again, lease);
+  EXPECT_THAT(granted, ElementsAre(digest_of(picture)));
+  worker.say(worker.work(again));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+}
+
+}  // namespace
+}  // namespace baton
