@@ -69,8 +69,10 @@ int main(int argc, char** argv) {
                  "between signs of life of a worker; it loses its leases when four are missing")
       ->check(CLI::Range(10, 60000))
       ->capture_default_str();
-  app.add_flag("--mixed-builds", options.mixed_builds,
-               "take workers of other builds and instruction sets: pixels may differ");
+  app.add_flag(
+      "--mixed-builds", options.mixed_builds,
+      "take workers of other builds and instruction sets. Their pixels may differ; each frame "
+      "is by one of them, which goes on while it is there");
   std::string key_file;
   bool insecure = false;
   app.add_option("--key", key_file, "server.key of `baton key create`; whoever it knows is let in")
@@ -94,9 +96,7 @@ int main(int argc, char** argv) {
   install_stop_handler();
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
   options.store_limit = store_limit_mib << 20;
-  options.disk.picture_writer = [](const std::filesystem::path& file) {
-    return baton::text_of_whole_exr(file, "baton:jobDigest");
-  };
+  options.disk.picture_writer = baton::writer_of_frame;
   const baton::Status status = coordinate(options, key_file, insecure, endpoint_file);
   if (status) return static_cast<int>(baton::ExitCode::ok);
   spdlog::error("{}", status.error().message);

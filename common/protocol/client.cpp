@@ -49,10 +49,18 @@ Result<Message> RequestClient::request(const Message& message, std::chrono::mill
   const Clock::time_point deadline = Clock::now() + timeout;
   pending_.clear();
 
-  // Nobody there is found out soon.
-  const bool connected = socket_.wait_to_send(std::min(timeout, kConnectPatience));
-  if (!connected || !socket_.send(encode_message(message)))
-    return give_up("no coordinator listens there");
+  // Nobody there is found out soon. A coordinator that stands still or is full may come back.
+  bool connected = socket_.wait_to_send(std::min(timeout, kConnectPatience));
+  if (!connected && socket_.was_connected()) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+    connected = socket_.wait_to_send(std::max(left, std::chrono::milliseconds(0)));
+  }
+  if (!connected || !socket_.send(encode_message(message))) {
+    return give_up(socket_.was_connected()
+                       ? "who listens there takes no connection: a coordinator that stands still "
+                         "or has no file descriptors left (its log says so), or another program"
+                       : "no coordinator listens there");
+  }
 
   // Wait for the one answer; a signal may end a wait early.
   std::optional<std::vector<Bytes>> frames;

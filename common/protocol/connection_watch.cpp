@@ -39,7 +39,8 @@ ConnectionWatch::ConnectionWatch(zmq::context_t& context, zmq::socket_t& watched
     : watched_(watched), events_(context, zmq::socket_type::pair) {
   constexpr int kFailures = ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
                             ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
-  const int heard = (what.handshakes ? kFailures : 0) | (what.connections ? ZMQ_EVENT_ACCEPTED : 0);
+  constexpr int kConnections = ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_CONNECTED;
+  const int heard = (what.handshakes ? kFailures : 0) | (what.connections ? kConnections : 0);
   BATON_CHECK(::zmq_socket_monitor(watched_.handle(), kWatchEndpoint, heard) == 0);
   events_.set(zmq::sockopt::linger, 0);
   events_.set(zmq::sockopt::rcvhwm, 0);  // a full queue would stop the thread that reports
@@ -59,6 +60,10 @@ bool ConnectionWatch::poll() {
     std::memcpy(&value, event[0].data() + sizeof(number), sizeof(value));
     if (number == ZMQ_EVENT_ACCEPTED) {
       connections_[static_cast<int>(value)] = {};
+      continue;
+    }
+    if (number == ZMQ_EVENT_CONNECTED) {
+      was_connected_ = true;
       continue;
     }
     has_failed = true;

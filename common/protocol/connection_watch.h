@@ -26,7 +26,7 @@ class ConnectionWatch {
   enum class Failure { broken_off, replayed, denied, endless };
   struct Hears {
     bool handshakes;   ///< failed handshakes
-    bool connections;  ///< accepted ones, of a listening socket
+    bool connections;  ///< that were made
   };
 
   ConnectionWatch(zmq::context_t& context, zmq::socket_t& watched, Hears what);
@@ -34,6 +34,8 @@ class ConnectionWatch {
   ConnectionWatch& operator=(const ConnectionWatch&) = delete;
   ~ConnectionWatch();
 
+  /// A connection to the other side stood at some time; its program need not have taken it.
+  bool was_connected() const { return was_connected_; }
   /// To be polled: something has happened.
   zmq::socket_t& events() { return events_; }
   /// Takes what has happened; true: a handshake failed.
@@ -60,6 +62,7 @@ class ConnectionWatch {
   zmq::socket_t events_;
   std::map<int, Connection> connections_;  ///< by file descriptor
   std::optional<Failure> failure_;
+  bool was_connected_ = false;
 };
 
 }  // namespace baton

@@ -65,7 +65,7 @@ bool poll_until(Clock::time_point deadline, std::vector<zmq::pollitem_t>& items)
 struct Socket::Impl {
   Impl(bool listens, bool has_key)
       : socket(context, listens ? zmq::socket_type::router : zmq::socket_type::dealer),
-        watch(context, socket, {.handshakes = has_key || !listens, .connections = listens}),
+        watch(context, socket, {.handshakes = has_key || !listens, .connections = true}),
         wake_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
         is_server(listens) {
     BATON_CHECK(bool{wake_fd});
@@ -262,6 +262,8 @@ std::optional<Error> Socket::take_refusal() {
                            "one is of another coordinator",
                            impl_->endpoint)};
 }
+
+bool Socket::was_connected() const { return impl_->watch.was_connected(); }
 
 void Socket::wake() { ::eventfd_write(impl_->wake_fd.number(), 1); }
 

@@ -55,6 +55,8 @@ class Socket {
   /// Why a connection was refused, by either side, once. usage: the key is not known, or the
   /// other side spoke against the rules; timeout: it was broken off, which may have other reasons.
   std::optional<Error> take_refusal();
+  /// Whether a connection to the other side stood at some time; its program need not have taken it.
+  bool was_connected() const;
   /// Ends a receive() that is under way, or the next one, early. From any thread.
   void wake();
   /// The concrete endpoint: with the port that was picked.

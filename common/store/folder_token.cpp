@@ -36,6 +36,12 @@ Result<std::string> read_after_token(const std::filesystem::path& file, const st
   const Result<std::string> found = read_text_file(file, kMaxTokenBytes);
   if (found && *found == token) return std::string();
   if (found && found->starts_with(token + "\n")) return found->substr(token.size() + 1);
+  // What cannot be read says nothing of the folder.
+  if (!found) {
+    const Status there = expect_file(file);
+    if (there || there.error().kind == ErrorKind::io)
+      return Error{ErrorKind::io, found.error().message};
+  }
   return Error{
       ErrorKind::io,
       fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "

@@ -20,8 +20,8 @@ Result<std::string> make_token(const std::filesystem::path& file, const std::str
 /// Writes a token that is known, and a line after it, if there is one.
 Status write_token(const std::filesystem::path& file, const std::string& token,
                    const std::string& line = {});
-/// The line after the token; empty: there is none. The error, io, names the folder of `file`: the
-/// token does not stand there.
+/// The line after the token; empty: there is none. The error, io, says that the token does not
+/// stand there and names the folder of `file`, or why the file cannot be read.
 Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token);
 /// The same error, or none.
 Status expect_token(const std::filesystem::path& file, const std::string& token);

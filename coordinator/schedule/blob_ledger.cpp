@@ -191,6 +191,15 @@ void BlobLedger::let_between_go(const JobView& job, BlobReferences& blobs) {
   let_go(job, checkpoints_.let_between_go(), blobs);
 }
 
+void BlobLedger::let_films_go(const JobView& job, BlobReferences& blobs) {
+  for (TaskIndex task = 0; task < job.graph.num_tasks(); ++task) {
+    for (const BlobRef& output : job.made.outputs(task)) {
+      if (output.kind == BlobKind::film && stays(job, task, output)) blobs.release(output.digest);
+    }
+    record(task).films_let_go = true;
+  }
+}
+
 // ---- what tasks need ----------------------------------------------------------------------------
 
 std::vector<TaskIndex> BlobLedger::need_inputs(const JobView& job, TaskIndex task,

@@ -71,6 +71,8 @@ class BlobLedger {
   void add_shared_outputs(const JobView& job, TaskIndex task, BlobReferences& blobs);
   /// Nothing between checkpoints stays for a worker that may be lost, now or later.
   void let_between_go(const JobView& job, BlobReferences& blobs);
+  /// What is done so far leaves no films to what comes after the job.
+  void let_films_go(const JobView& job, BlobReferences& blobs);
   /// Forgets every blob, of a job that is to be replaced.
   void release_all(const JobView& job, BlobReferences& blobs);
 

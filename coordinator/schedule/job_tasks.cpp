@@ -1,5 +1,7 @@
 #include "coordinator/schedule/job_tasks.h"
 
+#include <algorithm>
+
 #include "common/base/check.h"
 
 namespace baton {
@@ -148,6 +150,26 @@ std::vector<TaskIndex> JobTasks::reopen(TaskIndex task, BlobReferences& blobs) {
   for (const TaskIndex again : reopened) {
     if (book_.has_inputs(again)) book_.apply(graph_, again, TaskEvent::inputs_done);
   }
+  return reopened;
+}
+
+std::vector<TaskIndex> JobTasks::reopen_unfinished(BlobReferences& blobs) {
+  std::vector<TaskIndex> reopened;
+  const auto reopen_if_needed = [&](TaskIndex task) {
+    const std::vector<BlobRef>& outputs = made_.outputs(task);
+    const bool is_needed = std::ranges::any_of(outputs, [&](const BlobRef& output) {
+      return output.kind != BlobKind::state && ledger_.is_needed(view(), task, output);
+    });
+    if (!is_needed) return;
+    const std::vector<TaskIndex> more = reopen(task, blobs);
+    reopened.insert(reopened.end(), more.begin(), more.end());
+  };
+  // From the end of each frame back: second passes, later sweeps, earlier ones.
+  const TaskIndex first_render = *graph_.find(render_task(Run(0), 0));
+  for (TaskIndex task = graph_.num_frames(); task < first_render; ++task) reopen_if_needed(task);
+  for (TaskIndex task = graph_.num_tasks() - 1; task >= first_render; --task)
+    reopen_if_needed(task);
+  ledger_.let_films_go(view(), blobs);
   return reopened;
 }
 

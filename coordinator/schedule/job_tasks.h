@@ -72,6 +72,10 @@ class JobTasks {
   /// as far back as that goes. A task that is not done, but is a cut, is rendered instead. Returns
   /// those that were done.
   std::vector<TaskIndex> reopen(TaskIndex task, BlobReferences& blobs);
+  /// All that open tasks would take films of is done again, since they will be rendered otherwise,
+  /// and what is done leaves no films to be added to. Returns what is done again. Nothing may be
+  /// leased.
+  std::vector<TaskIndex> reopen_unfinished(BlobReferences& blobs);
   /// Ends a leased task for good, and cancels what cannot be done without it. Returns what was
   /// leased of that: an input of it was lost meanwhile.
   std::vector<TaskIndex> give_up(TaskIndex task);

@@ -1,6 +1,7 @@
 #include "coordinator/schedule/lease_book.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "common/base/check.h"
 #include "common/base/limits.h"
@@ -11,6 +12,7 @@ bool LeaseBook::join(const std::string& worker, TimePoint now, const std::string
   const auto [place, is_new] = workers_.try_emplace(worker);
   place->second.last_sign = now;
   place->second.renderer = renderer;
+  alike_.clear();
   want(worker, 0);
   if (is_new) connected_.insert(std::ranges::upper_bound(connected_, worker), worker);
   return is_new;
@@ -22,14 +24,21 @@ bool LeaseBook::renders_as(const std::string& worker, const std::string& rendere
          found->second.renderer == renderer;
 }
 
+const std::vector<std::string>& LeaseBook::alike(const std::string& renderer) const {
+  const auto [place, is_new] = alike_.try_emplace(renderer);
+  if (is_new) {
+    std::ranges::copy_if(connected_, std::back_inserter(place->second),
+                         [&](const std::string& worker) { return renders_as(worker, renderer); });
+  }
+  return place->second;
+}
+
 const std::string& LeaseBook::renderer_of(const std::string& worker) const {
   return workers_.at(worker).renderer;
 }
 
 bool LeaseBook::nobody_renders_as(const std::string& renderer) const {
-  return !connected_.empty() && std::ranges::none_of(connected_, [&](const std::string& worker) {
-    return renders_as(worker, renderer);
-  });
+  return !connected_.empty() && alike(renderer).empty();
 }
 
 bool LeaseBook::touch(const std::string& worker, TimePoint now) {
@@ -44,12 +53,17 @@ void LeaseBook::leave(const std::string& worker) {
   std::erase(hungry_, worker);
   std::erase(connected_, worker);
   workers_.erase(worker);
+  alike_.clear();
 }
 
-std::vector<std::string> LeaseBook::silent_since(TimePoint time) const {
+std::vector<std::string> LeaseBook::silent_at(TimePoint now, std::chrono::milliseconds limit) {
+  const auto most = std::chrono::steady_clock::duration(limit) / 4;
+  const auto pause = now - asked_for_silent_.value_or(now);
+  asked_for_silent_ = now;
   std::vector<std::string> silent;
-  for (const auto& [id, worker] : workers_) {
-    if (worker.last_sign < time) silent.push_back(id);
+  for (auto& [id, worker] : workers_) {
+    if (pause > most) worker.last_sign = std::min(now, worker.last_sign + (pause - most));
+    if (worker.last_sign < now - limit) silent.push_back(id);
   }
   return silent;
 }
@@ -115,6 +129,11 @@ std::vector<TaskIndex> LeaseBook::of_job(const Digest& job) const {
     tasks.push_back(lease->first.second);
   }
   return tasks;
+}
+
+const Lease* LeaseBook::any_of(const Digest& job) const {
+  const auto lease = leases_.lower_bound({job, 0});
+  return lease != leases_.end() && lease->first.first == job ? &lease->second : nullptr;
 }
 
 }  // namespace baton

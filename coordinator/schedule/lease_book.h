@@ -1,9 +1,11 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -48,8 +50,11 @@ class LeaseBook {
   bool knows(const std::string& worker) const { return workers_.contains(worker); }
   /// Names of all workers, sorted.
   const std::vector<std::string>& connected() const { return connected_; }
-  /// Workers without a sign of life since then.
-  std::vector<std::string> silent_since(TimePoint time) const;
+  /// Names of those that render as `renderer`, sorted. Valid until one comes or goes.
+  const std::vector<std::string>& alike(const std::string& renderer) const;
+  /// Workers without a sign of life for longer than `limit`, to be asked for from time to time. Who
+  /// asks late has stood still and heard nobody: a pause counts as a quarter of the limit at most.
+  std::vector<std::string> silent_at(TimePoint now, std::chrono::milliseconds limit);
 
   /// The worker wants so many leases more, whatever it wanted before.
   void want(const std::string& worker, std::int32_t count);
@@ -69,6 +74,8 @@ class LeaseBook {
   /// A worker that is not known has none.
   std::set<Place> of_worker(const std::string& worker) const;
   std::vector<TaskIndex> of_job(const Digest& job) const;
+  /// One of them; nullptr: there is none.
+  const Lease* any_of(const Digest& job) const;
   bool empty() const { return leases_.empty(); }
   /// What the outputs of all leases will take.
   std::uint64_t expected_bytes() const { return expected_bytes_; }
@@ -83,7 +90,10 @@ class LeaseBook {
   std::map<Place, Lease> leases_;
   std::map<std::string, Worker> workers_;
   std::vector<std::string> connected_;  ///< names of workers_, sorted
-  std::deque<std::string> hungry_;      ///< workers with wanted > 0
+  /// By renderer, as far as somebody asked since a worker came or went.
+  mutable std::map<std::string, std::vector<std::string>> alike_;
+  std::optional<TimePoint> asked_for_silent_;
+  std::deque<std::string> hungry_;  ///< workers with wanted > 0
   std::uint64_t expected_bytes_ = 0;
 };
 

@@ -15,7 +15,7 @@ namespace baton {
 /// Who may have what, as pure functions over snapshots: nothing here changes anything, or has ever
 /// seen a Scheduler.
 
-/// The workers that are connected, as they stand with one job.
+/// The workers that are connected and may work on one job, as they stand with it.
 struct Crew {
   const std::vector<std::string>& connected;
   const Standings& standings;

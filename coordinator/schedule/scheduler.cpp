@@ -18,10 +18,6 @@ void follow_longest(double& longest, double value) {
 
 }  // namespace
 
-Scheduler::Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit,
-                     std::uint64_t store_limit)
-    : epoch_(epoch), silence_limit_(silence_limit), store_limit_(store_limit) {}
-
 std::vector<Action> Scheduler::step(const Event& event, TimePoint now) {
   Actions actions;
   std::visit([&](const auto& e) { on(e, now, actions); }, event);
@@ -72,7 +68,7 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
                  .first->second;
   job.waits = event.waits;
   job.renderer = event.renderer;
-  job.homes.share_out(leases_.connected());
+  job.homes.share_out(leases_.alike(job.renderer));
   replay(job, event, actions);
   if (!is_open(event.status)) {
     job.tasks.cancel_open();
@@ -218,15 +214,15 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
 }
 
 /// Two different results for one task are a bug or a broken machine: the job pauses, so that
-/// somebody looks before more is made of them. Of a placeholder no bytes are known. Returns whether
-/// they are equal.
+/// somebody looks before more is made of them. Of a placeholder no bytes are known, and renderers
+/// that take over from each other differ. Returns whether they are equal.
 bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
                                 const std::vector<BlobRef>& reported, Actions& actions) {
   const auto [e, r] = std::mismatch(expected.begin(), expected.end(), reported.begin(),
                                     reported.end(), [](const BlobRef& a, const BlobRef& b) {
                                       return a.is_placeholder() || b.is_placeholder() || a == b;
                                     });
-  if (e == expected.end() || r == reported.end()) return true;
+  if (rules_.may_take_over || e == expected.end() || r == reported.end()) return true;
   const Digest digest = event.lease.job;
   Job& job = jobs_.at(digest);
   const std::string& maker = job.tasks.made().maker(*job.tasks.graph().find(event.lease.task));
@@ -347,7 +343,7 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
           std::clamp(done.task.run() + 1, job.begun_runs, Run(job.tasks.graph().num_runs()));
   }
   // Before it is counted who needs what.
-  if (store_limit_ > 0 || !event.failures.empty()) job.tasks.let_between_go(blobs_);
+  if (rules_.store_limit > 0 || !event.failures.empty()) job.tasks.let_between_go(blobs_);
   RecordReopened needed{event.job, {}};
   for (const TaskIndex task :
        job.tasks.restore(event.completions, event.lost_spares, blobs_, event.plan))
@@ -381,7 +377,7 @@ void Scheduler::fail_attempt(const Claim& claim, Failure failure, TimePoint now,
   Job& job = *claim.job;
   end_lease(digest, claim.task, LeaseEnd::failed, failure.message, actions);
   job.tasks.add_failure(claim.task, failure, blobs_);
-  failure.last = is_exhausted(leases_.connected(), job.tasks.attempts().blame(claim.task),
+  failure.last = is_exhausted(leases_.alike(job.renderer), job.tasks.attempts().blame(claim.task),
                               job.spec.max_retries_per_task);
   actions.push_back(RecordFailure{failure});
 

@@ -5,6 +5,7 @@
 #include <compare>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -57,22 +58,32 @@ class Scheduler {
     std::array<TimePoint, 3> rests_until = {};  ///< tasks of each kind
     std::string waits = {};                     ///< for what, as far as an event said so
     std::string renderer = {};                  ///< of what is done; empty: not known
+    /// Since then nobody renders so, and others would take over.
+    std::optional<TimePoint> alone_since = {};
     Standings standings = {};
     std::array<double, 3> longest_seconds = {};  ///< CPU time of tasks of each kind, of late
 
     Rank rank() const { return {-spec.priority, sequence}; }
     JobInStore in_store() const { return {tasks.graph(), tasks.book(), sizes, begun_runs}; }
+    /// Those that render as what is done of it.
     Crew crew(const LeaseBook& leases, TimePoint now) const {
-      return {leases.connected(), standings, now};
+      return {leases.alike(renderer), standings, now};
     }
     /// Whether the worker may try the task now, could it read its inputs.
     bool is_due(TaskIndex task, const std::string& worker, const Crew& workers) const;
   };
 
-  /// epoch: how often the coordinator has started; part of each lease. silence_limit: a worker that
-  /// says nothing for longer loses its leases. store_limit: bytes of the store; 0: no limit.
-  Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit,
-            std::uint64_t store_limit = 0);
+  struct Rules {
+    /// How often the coordinator has started; part of each lease.
+    std::uint32_t epoch = 0;
+    /// A worker that says nothing for longer loses its leases.
+    std::chrono::milliseconds silence_limit{};
+    std::uint64_t store_limit = 0;  ///< bytes of the store; 0: no limit
+    /// Of a job that one renderer began another makes the frames that are not done, where nobody
+    /// who renders so was connected for the silence limit; else the job waits for one.
+    bool may_take_over = false;
+  };
+  explicit Scheduler(const Rules& rules) : rules_(rules) {}
 
   /// How long tasks of a kind rest after one of them found no space.
   static constexpr std::chrono::seconds kRest{5};
@@ -88,6 +99,10 @@ class Scheduler {
   std::size_t num_jobs() const { return jobs_.size(); }
   /// All jobs, in the order of submission.
   std::vector<Digest> jobs() const;
+  /// Whether the job, which must be known, waits for somebody who renders as it was begun.
+  bool lacks_renderer(const Digest& job) const {
+    return !rules_.may_take_over && leases_.nobody_renders_as(jobs_.at(job).renderer);
+  }
   /// What the job, which must be known, cannot go on without; empty: it goes on, or has ended. Of a
   /// job that failed although its tasks are done, what somebody must decide.
   std::string waits_for(const Digest& job, TimePoint now) const;
@@ -165,6 +180,8 @@ class Scheduler {
   bool compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
                        const std::vector<BlobRef>& reported, Actions& actions);
   void fail_attempt(const Claim& claim, Failure failure, TimePoint now, Actions& actions);
+  bool take_over(const std::string& worker, const Digest& digest, Job& job, TimePoint now,
+                 Actions& actions);
   void give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
                Actions& actions);
   bool count_loss(const Digest& digest, Job& job, TaskIndex task, Actions& actions);
@@ -173,9 +190,7 @@ class Scheduler {
   void end_job(const Digest& digest, Job& job, JobStatus status, const std::string& reason,
                Actions& actions);
 
-  std::uint32_t epoch_;
-  std::chrono::milliseconds silence_limit_;
-  std::uint64_t store_limit_;
+  Rules rules_;
   std::uint64_t next_sequence_ = 0;
   std::map<Digest, Job> jobs_;
   std::map<Rank, Digest> running_;

@@ -18,6 +18,14 @@ StepSpan steps_to_render(const JobTasks& tasks, TaskIndex task) {
   return tasks.ledger().is_cut(task) ? StepSpan{steps.last + 1, steps.last} : steps;
 }
 
+/// What decides the bytes of the job's tasks: the renderer of what is done or, where nothing is, of
+/// what is being done; empty: anybody may begin.
+std::string renderer_of(const Digest& digest, const Scheduler::Job& job, const LeaseBook& leases) {
+  if (!job.renderer.empty()) return job.renderer;
+  const Lease* const begun = leases.any_of(digest);
+  return begun == nullptr ? std::string() : leases.renderer_of(begun->worker);
+}
+
 }  // namespace
 
 // ---- events: workers ----------------------------------------------------------------------------
@@ -27,7 +35,7 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
   for (auto& [digest, job] : jobs_) {
     job.standings.forget(event.worker);
     job.tasks.attempts().forgive(event.worker);
-    if (is_new) job.homes.share_out(leases_.connected());
+    if (is_new) job.homes.share_out(leases_.alike(job.renderer));
   }
   lose_held(event.worker, actions);
   reconcile(event.worker, event.running, now, now, actions);
@@ -36,7 +44,7 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
 void Scheduler::on(const WorkerAlive& event, TimePoint now, Actions& actions) {
   // A lease so new that it may still be on its way need not be named.
   if (leases_.touch(event.worker, now))
-    reconcile(event.worker, event.running, now - silence_limit_, now, actions);
+    reconcile(event.worker, event.running, now - rules_.silence_limit, now, actions);
 }
 
 void Scheduler::on(const WorkerLeft& event, TimePoint, Actions& actions) {
@@ -49,7 +57,7 @@ void Scheduler::on(const WorkRequested& event, TimePoint now, Actions&) {
 
 void Scheduler::on(const ClockTicked&, TimePoint now, Actions& actions) {
   asked_.clear();  // an answer may be lost
-  for (const std::string& id : leases_.silent_since(now - silence_limit_)) {
+  for (const std::string& id : leases_.silent_at(now, rules_.silence_limit)) {
     remove_worker(id, /*lost=*/true, actions);
     actions.push_back(ForgetWorker{id});
   }
@@ -88,7 +96,7 @@ Scheduler::Claim Scheduler::find_claim(const std::string& worker, const LeaseId&
   }
   if (job->tasks.book().status(*task) != TaskStatus::ready ||
       job->tasks.attempts().has_ended(*task, lease) || !can_read(job->tasks, *task, worker) ||
-      !leases_.renders_as(worker, job->renderer))
+      !leases_.renders_as(worker, renderer_of(lease.job, *job, leases_)))
     return {};
   job->tasks.grant(*task);
   add_lease(worker, lease, *task, now);
@@ -211,7 +219,9 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
   for (const auto& [rank, digest] : running_) {
     const Job& job = jobs_.at(digest);
     const Crew crew = job.crew(leases_, now);
-    if (job.tasks.made().totals().num_held == 0 || rests(crew, worker)) continue;
+    if (job.tasks.made().totals().num_held == 0 || rests(crew, worker) ||
+        !leases_.renders_as(worker, job.renderer))
+      continue;
     std::vector<TaskIndex> tasks;
     for (const TaskIndex task : job.tasks.book().ready()) {
       const TaskKey key = job.tasks.graph().key(task);
@@ -242,14 +252,36 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
   }
 }
 
+/// Whether the worker, which renders otherwise than the job was begun, makes the frames that are
+/// not done.
+bool Scheduler::take_over(const std::string& worker, const Digest& digest, Job& job, TimePoint now,
+                          Actions& actions) {
+  if (!rules_.may_take_over || !leases_.nobody_renders_as(job.renderer)) {
+    job.alone_since.reset();
+    return false;
+  }
+  if (!job.alone_since) job.alone_since = now;
+  if (now - *job.alone_since < rules_.silence_limit) return false;
+  RecordReopened record{digest, {}, "who renders with " + job.renderer};
+  for (const TaskIndex task : job.tasks.reopen_unfinished(blobs_))
+    record.tasks.push_back(job.tasks.graph().key(task));
+  if (!record.tasks.empty()) actions.push_back(std::move(record));
+  job.renderer = leases_.renderer_of(worker);
+  job.alone_since.reset();
+  actions.push_back(RecordRenderer{digest, job.renderer});
+  return true;
+}
+
 bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& actions) {
   bool others_wait = false;
   for (const auto& [rank, digest] : running_) {
     Job& job = jobs_.at(digest);
-    const Crew crew = job.crew(leases_, now);
-    if (job.tasks.book().ready().empty() || rests(crew, worker) ||
-        !leases_.renders_as(worker, job.renderer))
+    if (job.tasks.book().ready().empty()) continue;
+    if (!leases_.renders_as(worker, renderer_of(digest, job, leases_)) &&
+        !take_over(worker, digest, job, now, actions))
       continue;
+    const Crew crew = job.crew(leases_, now);
+    if (rests(crew, worker)) continue;
     const JobGraph& graph = job.tasks.graph();
     const auto task = job.homes.choose(
         graph, job.tasks.book().ready(),
@@ -261,7 +293,7 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
       others_wait = true;
       continue;
     }
-    const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), epoch_};
+    const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), rules_.epoch};
     Lease& granted = add_lease(worker, lease, *task, now);
     granted.may_hold =
         baton::may_hold(job.tasks, *task) && job.homes.surround(lease.task.tile, worker);
@@ -288,7 +320,7 @@ bool Scheduler::Job::is_due(TaskIndex task, const std::string& worker, const Cre
 std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   const Job& job = jobs_.at(digest);
   if (!is_open(job.status) || !job.waits.empty()) return job.waits;
-  if (leases_.nobody_renders_as(job.renderer)) {
+  if (lacks_renderer(digest)) {
     return fmt::format(
         "a worker that renders as what is done was rendered, with {}: those that are connected "
         "render with {}, and pixels may differ. --restart renders all frames again, --from-frame N "

@@ -22,12 +22,12 @@ void Scheduler::on(const AttemptLeft& attempt, TimePoint, Actions&) {
 }
 
 StoreRoom Scheduler::room() const {
-  return {store_limit_, store_bytes(), leases_.expected_bytes(), leases_.empty()};
+  return {rules_.store_limit, store_bytes(), leases_.expected_bytes(), leases_.empty()};
 }
 
 /// Whether a ready task of the job may be granted (store_room.h).
 bool Scheduler::has_room_for(const Job& job, TaskIndex task, bool others_wait) const {
-  if (store_limit_ == 0) return true;
+  if (rules_.store_limit == 0) return true;
   std::vector<JobInStore> others;
   for (const auto& [digest, other] : jobs_) {
     if (&other != &job && is_open(other.status)) others.push_back(other.in_store());
@@ -54,7 +54,7 @@ std::string Scheduler::lacking_room(const Job& job) const {
   return fmt::format(
       "room in the store: it holds {} of the {} that --store-limit allows, {} of them of jobs that "
       "have ended, and the next task needs about {}: raise the limit, or delete ended jobs",
-      bytes_text(store_bytes()), bytes_text(store_limit_), bytes_text(kept_bytes_),
+      bytes_text(store_bytes()), bytes_text(rules_.store_limit), bytes_text(kept_bytes_),
       bytes_text(job.sizes.largest(graph, graph.key(*job.tasks.book().ready().begin()))));
 }
 

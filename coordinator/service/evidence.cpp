@@ -4,6 +4,7 @@
 
 #include <cerrno>
 
+#include "common/base/file_stamp.h"
 #include "common/job/plan/sequence.h"
 
 namespace baton {
@@ -63,8 +64,8 @@ std::optional<std::string> find_hindrance(const FarmCore& farm, const LeaseId& l
   fs::path folder = is_frame ? fs::path(job->spec.output.directory) : farm.store_directory;
   std::error_code error;
   const fs::path frame = is_frame ? frame_path(job->spec, lease.task.frame()) : fs::path();
-  if (is_frame && fs::is_directory(frame, error))
-    return "a frame's place: " + frame.string() + " is a folder";
+  if (const auto stamp = stamp_of(frame); is_frame && !stamp)
+    return "a frame's place: " + stamp.error().message;
   if (is_frame && ::access(frame.c_str(), R_OK) != 0 && errno != ENOENT && errno != ENOTDIR)
     return "a frame's place: what is in " + frame.string() + " cannot be read";
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();

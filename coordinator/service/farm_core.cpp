@@ -36,7 +36,10 @@ FarmCore::FarmCore(const ServiceOptions& with, Router messages, Journal records,
       router(std::move(messages)),
       journal(std::move(records)),
       store(std::move(blobs)),
-      scheduler(journal.epoch(), kSilentHeartbeats * with.heartbeat, with.store_limit),
+      scheduler({.epoch = journal.epoch(),
+                 .silence_limit = kSilentHeartbeats * with.heartbeat,
+                 .store_limit = with.store_limit,
+                 .may_take_over = with.mixed_builds}),
       history(journal) {}
 
 Status FarmCore::let_out() {

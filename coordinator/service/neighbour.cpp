@@ -52,11 +52,11 @@ Error locked_elsewhere(const JobSpec& job, const Neighbour& other, const std::st
 Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job,
                       const std::string& other_name) {
   std::string text = fmt::format(
-      "job '{}': its frames would replace those of job {} ('{}', {}, {} of {} frames) in {}, which "
-      "is another picture; what differs: {}\n"
+      "job '{}': it would replace {} of the {} frames of job {} ('{}', {}) in {}, which is another "
+      "picture; what differs: {}\n"
       "--restart replaces them, another output.directory keeps them",
-      job.name, other_name, other_job.name, job_status_name(other.status), other.num_there,
-      other_job.frames.size(), job.output.directory, differing_text(other.differing));
+      job.name, other.written.size(), other_job.frames.size(), other_name, other_job.name,
+      job_status_name(other.status), job.output.directory, differing_text(other.differing));
   text += "; --from-frame N keeps those before frame N and renders from there on afresh";
   if (other.first_differing && *other.first_differing != other.written.front())
     text +=
@@ -68,7 +68,7 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
                   const FileTable& files, const std::vector<FrameNumber>* owned,
                   const Locks& locks) {
   const JobStatus status = former.status;
-  Neighbour other{job, status, {}, {}, {}, false, 0};
+  Neighbour other{job, status, {}, {}, {}, false};
   const JobSpec& theirs = former.document.job;
   const auto shared = shared_frames(theirs, wanted.job);
   std::map<FrameIndex, BlobRef> images;
@@ -90,7 +90,6 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
         std::find(owned->begin(), owned->end(), theirs.frames[mine.index()]) != owned->end();
     const bool is_there = is_owned && image != images.end() &&
                           files.is_right(frame_path(theirs, mine), image->second);
-    other.num_there += is_there ? 1 : 0;
     if (!is_there && !is_open(status)) continue;
     other.written.push_back(wanted.job.frames[its.index()]);
     differing.insert(picture.begin(), picture.end());

@@ -21,7 +21,6 @@ struct Neighbour {
   std::optional<FrameNumber> first_differing;
   /// It is open, and no frame says whose picture it is.
   bool busy = false;
-  std::size_t num_there = 0;  ///< frames in common that it has written
   /// Frames that it has not written and the new one does not have.
   std::vector<FrameNumber> left_out = {};
   /// Frames in common that are locked in it, as a job of its own.

@@ -88,13 +88,11 @@ Status Service::turn() {
   farm_.history.set_actor({});
   start_inspections();
   if (Clock::now() >= next_tick_) {
-    // Whoever has stood still has heard nobody: before it takes somebody for silent it listens.
-    const bool stood_still = Clock::now() - next_tick_ > farm_.options.heartbeat;
-    has_listened_ = stood_still && !has_listened_;
     next_tick_ = Clock::now() + kTick;
     asked_for_hello_.clear();
     tell_refusals();
-    if (!has_listened_) BATON_TRY(farm_.step(ClockTicked{}));
+    if (const auto lack = lack_of_descriptors()) tell("nobody else can connect for long: " + *lack);
+    BATON_TRY(farm_.step(ClockTicked{}));
     if (Clock::now() >= next_clean_up_) BATON_TRY(clean_up());
     farm_.retry_removals();
   }
@@ -154,9 +152,8 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   BATON_TRY(farm_.history.happened(
       FarmEventKind::worker_joined, hello.worker_id,
       fmt::format("{} threads on {}, {}", hello.num_threads, hello.host, hello.renderer)));
-  const std::string renderer =
-      farm_.options.mixed_builds ? std::string() : hello.renderer + ", " + hello.build;
-  return farm_.step(WorkerJoined{hello.worker_id, hello.running, renderer});
+  return farm_.step(
+      WorkerJoined{hello.worker_id, hello.running, hello.renderer + ", " + hello.build});
 }
 
 /// Says where pixels of the worker may differ from those of the others; nullopt: nowhere.

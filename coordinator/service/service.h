@@ -112,8 +112,6 @@ class Service {
   Speaker speaker_;                        ///< who sent the message in hand
   std::map<std::string, TimePoint> told_;  ///< warnings, and when
   TimePoint next_tick_{};
-  /// The last turn came late: it has let those speak who waited.
-  bool has_listened_ = false;
   TimePoint next_clean_up_;
   bool stop_requested_ = false;
   bool has_unread_jobs_ = false;  ///< in the journal

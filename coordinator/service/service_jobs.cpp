@@ -28,8 +28,9 @@ Status expect_folder(const std::filesystem::path& folder) {
   while (!exists(std::filesystem::symlink_status(there, error)) && there.has_relative_path())
     there = there.parent_path();
   if (is_directory(std::filesystem::status(there, error))) return {};
-  return Error{ErrorKind::io, fmt::format("{}: the output folder cannot be made: {} is no folder",
-                                          folder.string(), there.string())};
+  return Error{ErrorKind::io,
+               fmt::format("{}: the output folder cannot be made: {}{}", folder.string(),
+                           there.string(), error ? ": " + error.message() : " is no folder")};
 }
 
 }  // namespace
@@ -428,8 +429,7 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
     ShownJob shown{farm_.history.jobs().of(job), {}};
     shown.growth = growth.said;
     shown.locked = farm_.history.jobs().locked(shown.identity.id);
-    shown.lacks_renderer =
-        farm_.scheduler.leases().nobody_renders_as(farm_.scheduler.find_job(job)->renderer);
+    shown.lacks_renderer = farm_.scheduler.lacks_renderer(job);
     BATON_ASSIGN(shown.detail, farm_.living_detail(job));
     shown.detail.plan = std::move(plan);
     shown.detail.summary.owner = farm_.owner_of(job);

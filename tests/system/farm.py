@@ -214,11 +214,11 @@ class Farm:
             for process in processes:
                 print(f"---- {process.log_path.name} ----\n{process.log()[-4000:]}", file=sys.stderr)
 
-    def start_coordinator(self):
-        """Starts it, or starts it again on the same port and folder."""
+    def start_coordinator(self, extra=()):
+        """Starts it, or starts it again on the same port and folder. extra: more arguments."""
         self.endpoint = f"tcp://127.0.0.1:{self._port}"
         command = [self.programs.path("baton-coordinator"), "--listen", self.endpoint,
-                   "--work-dir", str(self.work_folder)]
+                   "--work-dir", str(self.work_folder), *map(str, extra)]
         self.coordinator = Process(command, self.folder / "coordinator.log", self.environment)
         wait_until(lambda: self.baton("job", "list", expect=None, deadline_s=20).returncode == OK,
                    "the coordinator answers")

@@ -36,7 +36,8 @@ def errors_of_the_moment_end_no_job(programs, folder):
     if not library(programs):
         return
     expected = programs.rendered(folder / "witness", moving(folder / "witness"))
-    for name, rate, place in (("sphere.off", 3, "mesh"), ("lamp.hdr", 3, "map"), (".blob", 60, "blobs"), (".exr", 20, "frames")):
+    for name, rate, place in (("sphere.off", 3, "mesh"), ("lamp.hdr", 3, "map"), (".blob", 60, "blobs"), (".exr", 20, "frames"),
+                              (".baton-", 6, "mark"), ("store/token", 6, "token")):
         place = folder / place
         with farm_on_bad_disk(programs, place, BATON_FILE_FAULTS=f"{rate}:{name}") as farm:
             ident = farm.submit(write_job(place / "job.json", moving(place)))

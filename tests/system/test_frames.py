@@ -8,6 +8,7 @@ import re
 import shutil
 import signal
 import time
+from pathlib import Path
 
 from farm import BAD_INPUT, DEADLINE_S, IO, OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
@@ -217,18 +218,24 @@ def what_nobody_here_has_written_is_not_replaced(programs, folder):
     check_equal(programs.pixels(forgotten / "frames"), programs.pixels(other / "frames"), "pixels of the same job")
 
 
-def a_folder_in_the_place_of_a_frame_is_waited_for(programs, folder):
+def what_is_no_file_in_the_place_of_a_frame_is_waited_for(programs, folder):
     expected = _undisturbed(programs, folder)
+    kinds = {"a folder": (Path.mkdir, Path.rmdir), "no plain file": (os.mkfifo, Path.unlink),
+             "a loop of links": (lambda path: path.symlink_to(path), Path.unlink)}
     with Farm(programs, folder / "farm") as farm:
-        ident = begin(farm, folder)
-        frame(folder, FRAMES).mkdir()
-        farm.start_worker()
-        shown = wait_until(lambda: (lambda s: s if f"frame.{FRAMES:04d}.exr is a folder" in s.get("waits", "") else None)
-                           (farm.show(ident)), "it waits for the place of the frame")
-        check_equal((shown["status"], shown["failures"]), ("running", []), "a job that waits")
-        frame(folder, FRAMES).rmdir()
-        farm.wait_for(ident)
-    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+        for name, (put, remove) in kinds.items():
+            place = folder / name.replace(" ", "-")
+            ident = begin(farm, place)
+            put(frame(place, FRAMES))
+            worker = farm.start_worker()
+            shown = wait_until(lambda: (lambda s: s if f"frame.{FRAMES:04d}.exr: is {name}" in s.get("waits", "") else None)
+                               (farm.show(ident)), f"it waits for the place of the frame, {name}")
+            check_equal((shown["status"], shown["failures"]), ("running", []), "a job that waits")
+            remove(frame(place, FRAMES))
+            farm.wait_for(ident)
+            worker.terminate()
+            worker.wait()
+            check_equal(programs.pixels(place / "frames"), expected, f"pixels, {name}")
 
 
 def an_output_folder_that_cannot_be_made_is_refused(programs, folder):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Machines that are not alike: frames of one job are by one instruction set, or it is said."""
 
+import re
 import time
 
 from farm import IO, OK, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
@@ -21,6 +22,11 @@ def sets_of(programs):
         if done.returncode != USAGE:
             found.append(name)
     return found
+
+
+def renderer_of(frame):
+    """As its header says."""
+    return re.search(rb"baton:renderer\0string\0....([ -~]*\))", frame.read_bytes(), re.DOTALL)[1]
 
 
 def another_instruction_set_does_not_go_on(programs, folder):
@@ -54,6 +60,40 @@ def another_instruction_set_does_not_go_on(programs, folder):
         farm.baton("job", "submit", path, "--restart")
         farm.wait_for(ident)
     check_equal(programs.pixels(folder / "frames"), programs.pixels(witness / "frames"), "pixels")
+
+
+def with_mixed_builds_a_frame_is_by_one(programs, folder):
+    """Two machines that are not alike: who began goes on while it is there; then the other makes the frames that are not
+    done, whole, and their headers name it."""
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    best, least = sets[-1], sets[0]
+    loose = {"state": {"carry": False}, "sampling": {"numCandidates": 128}, "image": {"tileSize": 16}}
+    by = {}
+    for isa in (best, least):
+        witness = folder / isa
+        programs.render(make(witness, **loose), witness / "work", extra=("--isa", isa))
+        by[isa] = programs.pixels(witness / "frames")
+    check(all(by[best][frame] != by[least][frame] for frame in by[best]), "the two sets make the same pixels: nothing to see")
+    with Farm(programs, folder / "farm", workers=None) as farm:
+        farm.start_coordinator(extra=("--mixed-builds",))
+        first = farm.start_worker(extra=("--isa", best))
+        ident = farm.submit(make(folder, **loose))
+        wait_until(lambda: farm.show(ident)["framesDone"] >= 1, "a frame is done")
+        farm.start_worker(extra=("--isa", least))
+        wait_until(lambda: farm.show(ident)["framesDone"] >= 3, "three frames are done")
+        first.kill()
+        farm.wait_for(ident)
+        check_says(farm.coordinator.log(), "tasks are done again, since who renders with")
+    makers = {}
+    for name, pixels in programs.pixels(folder / "frames").items():
+        makers[name] = next((isa for isa in by if by[isa][name] == pixels), "both")
+        check(makers[name] != "both", f"{name} is by both")
+        check_equal(renderer_of(folder / "frames" / name), renderer_of(folder / makers[name] / "frames" / name), f"header of {name}")
+    order = [makers[name] for name in sorted(makers)]
+    check_equal(order, sorted(order, key=[best, least].index), "who made the frames, in order")
+    check_equal(set(order), {best, least}, "who made the frames")
 
 
 def the_one_command_says_so(programs, folder):

@@ -278,10 +278,12 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
   std::optional<PictureInPlace> other;
   const auto may_appear = [&](const Digest& made) -> Status {
     const std::filesystem::path path = frame_path(loaded.job, frame);
-    BATON_ASSIGN(other, find_picture_in_place(path, made, grant.may_replace));
+    BATON_ASSIGN(other,
+                 patiently([&] { return find_picture_in_place(path, made, grant.may_replace); },
+                           store.stop()));
     if (other)
       return Error{ErrorKind::cancelled, path.string() + ": another picture is in its place"};
-    return expect_unlocked(loaded, frame);
+    return expect_unlocked(loaded, frame, store.stop());
   };
   const Result<WrittenFrame> written = write_frame(
       loaded.job, loaded.digest, frame, std::move(image), plate_image, may_appear, store.stop());

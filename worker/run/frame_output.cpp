@@ -6,10 +6,12 @@
 #include <cmath>
 #include <set>
 
+#include "common/base/build.h"
 #include "common/base/files.h"
 #include "common/base/patiently.h"
 #include "common/base/version.h"
 #include "common/image/cryptomatte.h"
+#include "common/image/frame_seal.h"
 #include "common/image/noise.h"
 #include "common/image/shadow.h"
 #include "common/job/aov.h"
@@ -18,6 +20,7 @@
 #include "common/scene/camera.h"
 #include "worker/pass/tile_renderer.h"
 #include "worker/run/frame_quality.h"
+#include "worker/run/renderer.h"
 
 namespace baton {
 namespace {
@@ -141,7 +144,8 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
   ImageMetadata metadata{{"baton:version", kVersion},
                          {"baton:jobName", job.name},
                          {"baton:jobDigest", job_digest.hex()},
-                         {"baton:instructionSet", instruction_set()},
+                         {kSealAttribute, blank_seal()},
+                         {"baton:renderer", describe_renderer() + ", " + build_identity()},
                          {"baton:frame", std::to_string(frame.value())},
                          {"baton:method", std::string(traits(job.sampling.method).name)}};
   const SamplingSpec& sampling = job.sampling;
@@ -214,7 +218,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
   const std::filesystem::path path = frame_path(job, frame);
   const FrameNumber number = job.frames.at(frame.index());
   const Camera camera(camera_at(job, number.value()), job.image.width, job.image.height);
-  BATON_ASSIGN(const Bytes bytes,
+  BATON_ASSIGN(Bytes bytes,
                encode_exr(path.string(), image,
                           {.half_float = job.output.pixel_type == PixelType::half_float,
                            .whole = whole_channels(job, quality),
@@ -226,6 +230,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
                            .frame_number = number.value(),
                            .naming = naming_of(job),
                            .display_window = job.image.whole()}));
+  seal_frame(path.filename().string(), bytes);
   const Digest made = digest_of(bytes);
   const auto check = [&](const std::filesystem::path& temporary) -> Status {
     const Status verified = verify_frame(temporary, image, frame.value());

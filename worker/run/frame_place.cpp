@@ -20,7 +20,7 @@ Result<std::optional<PictureInPlace>> find_picture_in_place(
   if (!bytes) return Error{ErrorKind::io, bytes.error().message};
   const Digest there = digest_of(*bytes);
   if (there == made || std::ranges::find(may_replace, there) != may_replace.end()) return kNothing;
-  std::optional<std::string> writer = text_of_whole_exr(frame, "baton:jobDigest");
+  std::optional<std::string> writer = writer_of_frame(frame);
   if (!writer) return kNothing;
   return std::optional(PictureInPlace{there, std::move(*writer)});
 }

@@ -125,15 +125,17 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
   return LoadedJobPtr(std::move(loaded));
 }
 
-Status expect_output_folder(const LoadedJob& loaded) {
-  if (loaded.token.empty()) return {};
-  return expect_token(output_token_file(loaded.job.output.directory, loaded.digest), loaded.token);
-}
-
-Status expect_unlocked(const LoadedJob& loaded, FrameIndex frame) {
+Status expect_output_folder(const LoadedJob& loaded, const std::stop_token& stop) {
   if (loaded.token.empty()) return {};
   const std::filesystem::path mark = output_token_file(loaded.job.output.directory, loaded.digest);
-  BATON_ASSIGN(const std::string locked, read_after_token(mark, loaded.token));
+  return patiently([&] { return expect_token(mark, loaded.token); }, stop);
+}
+
+Status expect_unlocked(const LoadedJob& loaded, FrameIndex frame, const std::stop_token& stop) {
+  if (loaded.token.empty()) return {};
+  const std::filesystem::path mark = output_token_file(loaded.job.output.directory, loaded.digest);
+  BATON_ASSIGN(const std::string locked,
+               patiently([&] { return read_after_token(mark, loaded.token); }, stop));
   if (locked.empty()) return {};
   BATON_ASSIGN(const std::vector<FrameNumber> frames, parse_frames(locked));
   const FrameNumber number = loaded.job.frames.at(frame.index());

@@ -60,9 +60,9 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
                                        AssetShelf& shelf);
 
 /// Whether the job's output folder is the one that the coordinator has marked.
-Status expect_output_folder(const LoadedJob& loaded);
+Status expect_output_folder(const LoadedJob& loaded, const std::stop_token& stop = {});
 /// That, and the mark does not say that the frame is locked. Error of its own: cancelled.
-Status expect_unlocked(const LoadedJob& loaded, FrameIndex frame);
+Status expect_unlocked(const LoadedJob& loaded, FrameIndex frame, const std::stop_token& stop);
 
 /// How long a file that cannot be read is waited for before the attempt counts as failed: a disk of
 /// another machine may be away for a moment.

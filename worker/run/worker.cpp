@@ -18,15 +18,16 @@
 #include "common/base/build.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/base/patiently.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/job_json.h"
 #include "common/math/instruction_set.h"
 #include "common/protocol/worker_channel.h"
 #include "common/store/folder_token.h"
-#include "worker/accel/accel.h"
 #include "worker/pass/render_context.h"
 #include "worker/run/crash_handler.h"
 #include "worker/run/render_threads.h"
+#include "worker/run/renderer.h"
 #include "worker/run/replay.h"
 #include "worker/run/session.h"
 #include "worker/run/task_watch.h"
@@ -37,14 +38,6 @@ namespace {
 /// How long the control thread sleeps when nothing wakes it: bounds how late it sees a signal or a
 /// due heartbeat.
 constexpr std::chrono::milliseconds kTickInterval{50};
-
-/// Instruction set and ray tracer.
-std::string describe_renderer() {
-  const Scene empty;
-  const auto accel = Accel::build(empty);
-  return fmt::format("{}, {}", instruction_set(),
-                     accel ? (*accel)->description() : accel.error().message);
-}
 
 std::string host_name() {
   std::array<char, 256> name{};
@@ -130,12 +123,12 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
   BATON_TRY(check_output_root(loaded->job, roots));
   if (key.kind == TaskKind::assemble) {
     // So may what is mounted.
-    if (const Status seen = expect_output_folder(*loaded); !seen) {
+    if (const Status seen = expect_output_folder(*loaded, stop); !seen) {
       notes.report(loaded->digest, {seen.error().message});
       return TaskResult{.made = {}, .unseen = seen.error().message};
     }
     Result<TaskResult> frame = execute_task(*loaded, *task.store, task.grant, stop, &left);
-    if (const Status seen = expect_output_folder(*loaded); !frame && !seen)
+    if (const Status seen = frame ? Status() : expect_output_folder(*loaded, stop); !seen)
       return TaskResult{.made = {}, .unseen = seen.error().message};
     if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
     return frame;
@@ -314,8 +307,10 @@ class Worker {
   void perform(UseStore& action) {
     if (store_ && store_directory_ == action.directory) return;
     const std::filesystem::path folder = map_path(action.directory, machine_.maps);
-    const Status seen = expect_token(folder / "token", action.token);
-    Result<BlobStore> store = seen ? BlobStore::open(folder) : seen.error();
+    Result<BlobStore> store = patiently([&]() -> Result<BlobStore> {
+      BATON_TRY(expect_token(folder / "token", action.token));
+      return BlobStore::open(folder);
+    });
     if (!store) {
       channel_.send(WorkerGoodbye{});
       leave_ = Leave{exit_code_of(store.error().kind), store.error().message};

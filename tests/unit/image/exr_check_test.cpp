@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "common/base/files.h"
+#include "common/image/frame_seal.h"
 #include "common/image/image_io.h"
 
 namespace baton {
@@ -14,23 +15,61 @@ namespace fs = std::filesystem;
 
 struct ExrCheckTest : testing::Test {
   fs::path file = fs::path(testing::TempDir()) / "exr_check.exr";
-  Bytes bytes;
+  Bytes bytes, unsealed;
 
   void SetUp() override {
     FilmTile image{.rect = {0, 0, 32, 40}, .channels = {"B", "G", "R"}, .values = {}};
     for (std::size_t i = 0; i < 3 * image.num_pixels(); ++i)
       image.values.push_back(static_cast<float>(i % 37) / 8);
-    bytes = encode_exr("test", image, {.metadata = {{"baton:jobDigest", "0123"}}}).value();
+    const ImageMetadata metadata{{"baton:jobDigest", "0123"}, {kSealAttribute, blank_seal()}};
+    bytes = encode_exr("test", image, {.metadata = metadata}).value();
+    unsealed = bytes;
+    seal_frame(file.filename().string(), bytes);
     write(bytes);
   }
   void TearDown() override { fs::remove(file); }
   void write(ByteView content) const { ASSERT_TRUE(write_file_atomic(file, content).ok()); }
-  std::optional<std::string> text() const { return text_of_whole_exr(file, "baton:jobDigest"); }
+  std::optional<std::string> text() const { return writer_of_frame(file); }
 };
 
 TEST_F(ExrCheckTest, AWholeFileSaysWhoWroteIt) {
   EXPECT_EQ(text(), "0123");
-  EXPECT_EQ(text_of_whole_exr(file, "other"), "");
+  write(unsealed);
+  EXPECT_EQ(text(), "");
+}
+
+// A painted frame may keep its header, and a copy may lie in another frame's place.
+TEST_F(ExrCheckTest, AFrameThatIsNotAsItWasWrittenIsNobodys) {
+  const fs::path other = file.parent_path() / "exr_check.other.exr";
+  ASSERT_TRUE(write_file_atomic(other, bytes).ok());
+  EXPECT_EQ(writer_of_frame(other), "");
+  fs::remove(other);
+
+  FilmTile image{.rect = {0, 0, 32, 40}, .channels = {"B", "G", "R"}, .values = {}};
+  image.values.assign(3 * image.num_pixels(), 1);
+  const Bytes sealed = bytes;
+  const std::string text_of_all(reinterpret_cast<const char*>(sealed.data()), sealed.size());
+  const std::size_t at = text_of_all.find(kSealAttribute) + sizeof(kSealAttribute) + 7 + 4;
+  const ImageMetadata metadata{{"baton:jobDigest", "0123"},
+                               {kSealAttribute, text_of_all.substr(at, 32)}};
+  write(encode_exr("test", image, {.metadata = metadata}).value());
+  EXPECT_EQ(text(), "") << "painted, with the header that it had";
+}
+
+// The same bytes under the same name, wherever and whenever.
+TEST_F(ExrCheckTest, SealsAreThoseOfNameAndBytes) {
+  Bytes again = unsealed;
+  seal_frame(file.filename().string(), again);
+  EXPECT_EQ(again, bytes);
+  EXPECT_TRUE(is_sealed(file.filename().string(), bytes));
+  EXPECT_FALSE(is_sealed("else.exr", bytes));
+  EXPECT_FALSE(is_sealed(file.filename().string(), unsealed));
+  EXPECT_FALSE(is_sealed("empty", {}));
+  for (std::size_t i = 0; i < bytes.size(); i += 101) {
+    Bytes changed = bytes;
+    changed[i] ^= std::byte{1};
+    EXPECT_FALSE(is_sealed(file.filename().string(), changed)) << i;
+  }
 }
 
 TEST_F(ExrCheckTest, WhatIsCutOrNoExrIsNone) {

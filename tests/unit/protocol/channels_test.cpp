@@ -1,8 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include <thread>
 
+#include "common/base/file_descriptor.h"
 #include "common/base/limits.h"
 #include "common/protocol/client.h"
 #include "common/protocol/router.h"
@@ -84,6 +87,26 @@ TEST(RequestClientAlone, NobodyThereIsSaidSo) {
   ASSERT_FALSE(answer.ok());
   EXPECT_EQ(answer.error().kind, ErrorKind::timeout);
   EXPECT_EQ(answer.error().message, "tcp://127.0.0.1:1: no coordinator listens there");
+}
+
+// A coordinator that stands still, or has no descriptor for one more connection.
+TEST(RequestClientAlone, WhoListensAndTakesNobodyIsToldApart) {
+  const FileDescriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  auto* const place = reinterpret_cast<sockaddr*>(&address);
+  socklen_t size = sizeof(address);
+  ASSERT_EQ(::bind(listener.number(), place, size), 0);
+  ASSERT_EQ(::listen(listener.number(), 4), 0);
+  ASSERT_EQ(::getsockname(listener.number(), place, &size), 0);
+
+  const std::string endpoint = "tcp://127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  RequestClient client = RequestClient::connect(endpoint).value();
+  const Result<Message> answer = client.request(ListJobs{}, with_patience(200ms));
+  ASSERT_FALSE(answer.ok());
+  EXPECT_EQ(answer.error().kind, ErrorKind::timeout);
+  EXPECT_THAT(answer.error().message, HasSubstr(endpoint + ": who listens there takes no"));
 }
 
 TEST_F(ChannelTest, AWorkersMessagesKeepTheirOrder) {

@@ -23,6 +23,7 @@ class ExecuteTest : public testing::Test {
   void SetUp() override {
     const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
     folder_ = testing::TempDir() + "execute_" + name + "/";
+    std::filesystem::remove_all(folder_);  // frames of an earlier run are none of this job
     ASSERT_TRUE(write_file_atomic(folder_ + "tetrahedron.off",
                                   as_bytes_view("OFF\n4 4 0\n1 1 1\n-1 -1 1\n-1 1 -1\n1 -1 -1\n"
                                                 "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")));

@@ -4,6 +4,7 @@
 
 #include "common/base/files.h"
 #include "common/image/film_tile.h"
+#include "common/image/frame_seal.h"
 #include "common/image/image_io.h"
 
 namespace baton {
@@ -23,8 +24,11 @@ struct FramePlaceTest : testing::Test {
   Digest put_picture(float value, const std::string& job) const {
     FilmTile image{.rect = {0, 0, 4, 4}, .channels = {"R", "G", "B"}, .values = {}};
     image.values.assign(3 * image.num_pixels(), value);
-    EXPECT_TRUE(write_exr(frame.string(), image,
-                          {.metadata = {{"baton:jobDigest", job}}, .display_window = image.rect}));
+    const ImageMetadata metadata{{"baton:jobDigest", job}, {kSealAttribute, blank_seal()}};
+    Bytes bytes =
+        encode_exr("test", image, {.metadata = metadata, .display_window = image.rect}).value();
+    seal_frame(frame.filename().string(), bytes);
+    EXPECT_TRUE(write_file_atomic(frame, bytes));
     return digest_of(read_file(frame, 1 << 20).value());
   }
   std::optional<PictureInPlace> find(const std::vector<Digest>& may_replace = {}) const {

@@ -81,6 +81,7 @@ void ChaosFarm::change_job(JobSpec next) {
     EXPECT_TRUE(recorded_.insert(done.task).second) << "adopted twice";
   failures_.clear();
   lost_frames_.clear();
+  rendered_by_.clear();
   job_ = digest_of("job " + std::to_string(++num_changes_));
   add_job();
   std::erase_if(kept_, [this](const Digest& blob) { return scheduler_->is_referenced(blob); });
@@ -104,8 +105,9 @@ void ChaosFarm::delete_job() {
 void ChaosFarm::add_job() {
   JobAdded added{job_, spec_, JobStatus::running, completions_of(completions_), failures_};
   added.plan = plan_;
+  added.renderer = renderer_;
   // It looks for every file that it counts on.
-  Scheduler trial(0, kSilence);
+  Scheduler trial({.silence_limit = kSilence});
   trial.step(added, now_);
   const JobTasks& tasks = trial.find_job(job_)->tasks;
   for (const Completion& done : completions_) {
@@ -160,7 +162,7 @@ void ChaosFarm::report(const std::string& worker) {
     return;
   }
   if (!held.published) publish(worker, lease, held);
-  const TaskCompleted done{worker, lease, {outputs(lease.task, held)}};
+  const TaskCompleted done{worker, lease, {outputs(worker, lease.task, held)}};
   old_reports_.push_back(done);
   say(worker, lease, done);
 }
@@ -188,6 +190,25 @@ void ChaosFarm::on(const GrantLease& a) {
     }
   }
   if (arrives) held_[a.worker].emplace(a.lease, Held{a.inputs, a.steps, a.may_hold && roll(5) > 0});
+}
+
+void ChaosFarm::check_renderer(const TaskKey& task) {
+  if (options_.num_renderers == 1) return;
+  const std::string renderer = renderer_of(reporter_);
+  EXPECT_EQ(renderer, renderer_) << "the job's";
+  rendered_by_[task] = renderer;
+  for (const TaskIndex input : graph_.inputs(task)) {
+    const TaskKey maker = graph_.key(input);
+    const std::vector<std::size_t> taken = graph_.taken_outputs(task, maker);
+    const bool is_state = maker.kind == TaskKind::render && graph_.carries_state();
+    const bool takes_films =
+        std::ranges::any_of(taken, [&](std::size_t position) { return !is_state || position > 0; });
+    const auto made = rendered_by_.find(maker);
+    if (takes_films && made != rendered_by_.end()) {
+      EXPECT_EQ(made->second, renderer)
+          << "one frame by two renderers: " << describe_task(maker) << ", " << describe_task(task);
+    }
+  }
 }
 
 /// Where no file and no coordinator is lost, a lost worker costs what it has made itself, and of

@@ -24,6 +24,9 @@ class ChaosFarm {
     bool failures = true;
     std::uint64_t store_limit = 0;
     bool restarts = true;  ///< of the coordinator
+    /// Of the workers, in turn; where there are several, no bytes of one are those of another, and
+    /// each frame is by one.
+    int num_renderers = 1;
   };
   ChaosFarm(std::uint32_t seed, JobSpec spec, Options options)
       : random_(seed), spec_(std::move(spec)), graph_(spec_), options_(options) {
@@ -73,6 +76,7 @@ class ChaosFarm {
   /// Frames that were missed when all tasks were done.
   std::size_t num_inspected_lost() const { return num_inspected_lost_; }
   std::size_t num_cuts() const { return num_cuts_; }
+  std::size_t num_taken_over() const { return num_taken_over_; }
   const JobSpec& spec() const { return spec_; }
   /// Bytes of blobs that somebody needs, at most so far.
   std::uint64_t most_bytes() const { return most_bytes_; }
@@ -90,7 +94,8 @@ class ChaosFarm {
   int roll(int sides) { return static_cast<int>(random_() % static_cast<std::uint32_t>(sides)); }
 
   void start_coordinator() {
-    scheduler_ = std::make_unique<Scheduler>(++epoch_, kSilence, options_.store_limit);
+    scheduler_ = std::make_unique<Scheduler>(
+        Scheduler::Rules{++epoch_, kSilence, options_.store_limit, options_.num_renderers > 1});
     known_.clear();
     granted_.clear();
     unreported_.merge(told_);
@@ -130,7 +135,12 @@ class ChaosFarm {
 
   void join(const std::string& worker) {
     known_.insert(worker);
-    step(WorkerJoined{worker, leases(worker)});
+    step(WorkerJoined{worker, leases(worker), renderer_of(worker)});
+  }
+
+  std::string renderer_of(const std::string& worker) const {
+    if (options_.num_renderers == 1) return {};
+    return "renderer " + std::to_string(std::stoi(worker.substr(1)) % options_.num_renderers);
   }
 
   /// The process dies, with all that it holds.
@@ -147,7 +157,8 @@ class ChaosFarm {
   }
   /// It has no result of the lease, and will say what it published for it.
   void tell_left(const std::string& worker, const LeaseId& lease, const Held& held) {
-    if (held.published) left_.push_back({worker, {lease, stored_blobs(outputs(lease.task, held))}});
+    if (held.published)
+      left_.push_back({worker, {lease, stored_blobs(outputs(worker, lease.task, held))}});
   }
   void tell_left(const std::string& worker, const LeaseId& lease, const Event& report) {
     if (const auto* done = std::get_if<TaskCompleted>(&report))
@@ -261,9 +272,9 @@ class ChaosFarm {
     return missing;
   }
   void publish(const std::string& worker, const LeaseId& lease, Held held) {
-    const std::vector<BlobRef> made = outputs(lease.task, held);
+    const std::vector<BlobRef> made = outputs(worker, lease.task, held);
     held.holds = false;
-    const std::vector<BlobRef> packed = outputs(lease.task, held);
+    const std::vector<BlobRef> packed = outputs(worker, lease.task, held);
     for (std::size_t i = 0; i < made.size(); ++i) {
       if (made[i].is_held()) {
         memory_[worker].insert_or_assign(made[i].digest, PublishedState{made[i], packed[i]});
@@ -274,8 +285,10 @@ class ChaosFarm {
     }
   }
 
-  std::vector<BlobRef> outputs(const TaskKey& task, const Held& held) const {
-    const Digest tiling = digest_of("tiles of " + std::to_string(spec_.image.tile_size));
+  std::vector<BlobRef> outputs(const std::string& worker, const TaskKey& task,
+                               const Held& held) const {
+    const Digest tiling =
+        digest_of("tiles of " + std::to_string(spec_.image.tile_size) + renderer_of(worker));
     std::vector<BlobRef> outputs = outputs_of_grant(spec_, tiling, task, held.steps);
     for (BlobRef& blob : outputs) {
       if (options_.alike && blob.kind == BlobKind::film)
@@ -328,7 +341,10 @@ class ChaosFarm {
     completions_.push_back(a.completion);
     makers_[a.completion.task].insert(reporter_);
     lost_frames_.erase(a.completion.task);
+    check_renderer(a.completion.task);
   }
+  /// What it was made of, but for states, was made by who renders as its maker.
+  void check_renderer(const TaskKey& task);
   void on(const RecordOutputs& a) {
     EXPECT_TRUE(recorded_.contains(a.task)) << "only what is done lies anywhere";
     for (Completion& done : completions_) {
@@ -344,6 +360,7 @@ class ChaosFarm {
     for (const TaskKey& task : a.tasks) {
       EXPECT_EQ(recorded_.erase(task), 1u) << "only what was done is done again";
       std::erase_if(completions_, [&](const Completion& c) { return c.task == task; });
+      rendered_by_.erase(task);
     }
     num_reopened_ += a.tasks.size();
     check_own_loss(a);
@@ -351,7 +368,10 @@ class ChaosFarm {
   void check_own_loss(const RecordReopened& a) const;
   void on(const RecordFailure& a) { failures_.push_back(a.failure); }
   void on(const RecordJobStatus&) {}
-  void on(const RecordRenderer&) {}
+  void on(const RecordRenderer& a) {
+    num_taken_over_ += renderer_.empty() ? 0 : 1;
+    renderer_ = a.renderer;
+  }
   void on(const InspectFrames&) { inspects_ = true; }
   void on(const GrantLease& a);
   void on(const TellLeaseEnd& a) { granted_.erase(a.lease); }
@@ -403,6 +423,8 @@ class ChaosFarm {
   std::set<TaskKey> recorded_;
   std::string reporter_;                             ///< of the last report
   std::map<TaskKey, std::set<std::string>> makers_;  ///< whose reports were recorded
+  std::map<TaskKey, std::string> rendered_by_;
+  std::string renderer_;  ///< of the job, as recorded
   std::set<LeaseId> issued_;
   /// By this coordinator, without an end so far.
   std::set<LeaseId> granted_;
@@ -418,6 +440,7 @@ class ChaosFarm {
   std::size_t num_changes_ = 0, num_kept_frames_ = 0, num_cuts_ = 0;
   std::size_t num_removed_ = 0, num_missing_ = 0, num_lost_ = 0, num_reopened_ = 0, num_events_ = 0;
   bool inspects_ = false;
+  std::size_t num_taken_over_ = 0;
   std::size_t num_inspected_lost_ = 0;
   std::size_t num_held_ = 0, num_published_ = 0, num_held_lost_ = 0;
   std::uint64_t most_bytes_ = 0;

@@ -143,8 +143,11 @@ inline std::vector<TaskKey> tasks_of(const std::vector<GrantLease>& grants) {
 /// A scheduler with a clock and one job, driven by the words of a test.
 class Farm {
  public:
-  explicit Farm(JobSpec spec, std::uint32_t epoch = 1, std::uint64_t store_limit = 0)
-      : spec_(std::move(spec)), scheduler(epoch, kSilence, store_limit), job(digest_of("job")) {}
+  explicit Farm(JobSpec spec, std::uint32_t epoch = 1, std::uint64_t store_limit = 0,
+                bool may_take_over = false)
+      : spec_(std::move(spec)),
+        scheduler({epoch, kSilence, store_limit, may_take_over}),
+        job(digest_of("job")) {}
 
   std::vector<Action> submit() { return step(JobAdded{job, spec_, JobStatus::running, {}, {}}); }
   /// Frames that are to be inspected are all there.

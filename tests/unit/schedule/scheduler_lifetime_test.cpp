@@ -237,7 +237,7 @@ TEST_F(SchedulerTest, AJobIsDoneWhenItsFramesHaveBeenInspected) {
 }
 
 TEST_F(SchedulerTest, AJobWithFramesOfOthersFails) {
-  Scheduler strict(1, kSilence);
+  Scheduler strict({.epoch = 1, .silence_limit = kSilence});
   JobAdded all{farm.job, farm.spec(), JobStatus::running, {}, {}};
   const JobGraph graph(farm.spec());
   for (TaskIndex task = 0; task < graph.num_tasks(); ++task)

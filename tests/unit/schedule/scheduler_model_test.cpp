@@ -85,6 +85,37 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
   EXPECT_GT(num_missing, num_seeds() / 50) << "alike blobs went between publishing and reporting";
 }
 
+// Renderers take over from each other at whole frames, with all that goes wrong.
+TEST(SchedulerModel, AFrameIsByOneRenderer) {
+  std::size_t num_taken_over = 0, num_reopened = 0;
+  for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    JobSpec spec = small_job(1 + static_cast<int>(seed % 4), 10, 1 + static_cast<int>(seed % 4),
+                             seed % 3 != 0);
+    if (seed % 4 == 0) spec = moving_job(4, 8, 1 + static_cast<int>(seed % 9));
+    spec.visibility.correlated = seed % 3 == 1;
+    if (!spec.visibility.correlated && seed % 5 == 0) spec.quality.sweeps = 2;
+    spec.max_retries_per_task = 1000000;
+    spec.max_failures_per_worker = 1000000;
+    ChaosFarm farm(seed, spec, {.num_workers = 2, .num_renderers = 2});
+    int steps = 0;
+    if (seed % 3 == 0) {
+      for (; farm.status() == JobStatus::running && steps < 300; ++steps) farm.advance(true);
+      farm.change_job(changed(farm.spec(), seed / 3));
+    }
+    for (; farm.status() == JobStatus::running && steps < 20000; ++steps)
+      farm.advance(/*trouble=*/steps < 3000);
+    EXPECT_EQ(farm.status(), JobStatus::done) << "after " << steps << " steps";
+    EXPECT_EQ(farm.num_recorded(), farm.num_tasks());
+    num_taken_over += farm.num_taken_over();
+    num_reopened += farm.num_reopened();
+    if (testing::Test::HasFailure()) return;
+  }
+  RecordProperty("taken_over", std::to_string(num_taken_over));
+  EXPECT_GT(num_taken_over, num_seeds() / 8);
+  EXPECT_GT(num_reopened, num_seeds());
+}
+
 // A result that is not there costs time and nothing else: with no retries allowed the job ends
 // well.
 TEST(SchedulerModel, NobodyIsBlamedForBlobsThatAreAlike) {

@@ -68,7 +68,8 @@ TEST_F(ServiceTest, AnOutputFolderBelongsToOneJob) {
   worker.say(Heartbeat{});
   worker.expect<Heartbeat>();
   EXPECT_EQ(show_end(service.endpoint(), second).summary.status, JobStatus::done);
-  EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message, HasSubstr("4 of 4 frames"));
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message,
+              HasSubstr("4 of the 4 frames"));
   EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).already_there);
   // It was done; that its frames are gone since does not change what happened.
   const JobDetail former = show(service.endpoint(), second);

@@ -27,6 +27,17 @@ TEST(FolderToken, ATokenStaysAndTellsItsFolder) {
   }
 }
 
+// What cannot be read is no other folder.
+TEST(FolderToken, WhyItCannotBeReadIsSaid) {
+  const fs::path file = fs::path(testing::TempDir()) / "unreadable" / "token";
+  fs::remove_all(file.parent_path());
+  fs::create_directories(file);
+  const Status seen = expect_token(file, "abc");
+  ASSERT_FALSE(seen);
+  EXPECT_EQ(seen.error().kind, ErrorKind::io) << "of the moment: it is looked at again";
+  EXPECT_EQ(seen.error().message, file.string() + ": is a folder, expected a file");
+}
+
 TEST(FolderToken, ALineMayStandAfterIt) {
   const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "line" / "token";
   ASSERT_TRUE(write_token(file, "abc", "2-5,9"));
