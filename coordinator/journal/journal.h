@@ -144,10 +144,10 @@ class Journal {
   /// Summaries of the newest `count` jobs in the archive, the oldest first.
   Result<std::vector<Bytes>> archived_summaries(int count);
   Result<std::uint64_t> num_archived();
-  /// The jobs, in the archive or not, that write to a folder, in the order of submission.
-  Result<std::vector<Digest>> jobs_in(const std::string& folder);
-  /// Those of this name, oldest first.
-  Result<std::vector<Digest>> jobs_in(const std::string& folder, const std::string& name);
+  /// The jobs, in the archive or not, that write to a folder, or those of this name, in the order
+  /// of submission.
+  Result<std::vector<Digest>> jobs_in(const std::string& folder,
+                                      const std::optional<std::string>& name = {});
   /// The jobs of this name, or whose ID begins so, or the digest of a version; a few of them.
   Result<std::vector<FoundJob>> find_jobs(const std::string& text);
   /// Whether a job of the archive keeps the blob.
@@ -182,6 +182,8 @@ class Journal {
   Status record_event(const FarmEvent& event);
   /// In the order of time.
   Result<std::vector<FarmEvent>> events(const EventQuery& query);
+  /// Grants and arrivals of workers since the newest start of a coordinator that have no end.
+  Result<std::vector<FarmEvent>> events_without_end();
   /// What forgotten events of a job counted, by kind.
   Result<std::map<FarmEventKind, EventSum>> event_sums(const JobId& job);
   /// Forgets events but the newest `most` and those before `until_ms`; what they counted is kept as

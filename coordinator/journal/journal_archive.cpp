@@ -123,17 +123,13 @@ Result<std::uint64_t> Journal::num_archived() {
   return row ? static_cast<std::uint64_t>(query.integer(0)) : 0;
 }
 
-Result<std::vector<Digest>> Journal::jobs_in(const std::string& folder) {
+Result<std::vector<Digest>> Journal::jobs_in(const std::string& folder,
+                                             const std::optional<std::string>& name) {
   BATON_ASSIGN(SqlStatement query,
-               database_.prepare("SELECT digest FROM jobs WHERE folder = ? ORDER BY position"));
-  query.bind(folder);
-  return read_digests(query);
-}
-
-Result<std::vector<Digest>> Journal::jobs_in(const std::string& folder, const std::string& name) {
-  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT digest FROM jobs WHERE folder = ? AND "
-                                                     "name = ? ORDER BY position"));
-  query.bind(folder).bind(name);
+               database_.prepare(fmt::format("SELECT digest FROM jobs WHERE folder = ?1 AND {} "
+                                             "ORDER BY position",
+                                             name ? "name = ?2" : "?2 = ?2")));
+  query.bind(folder).bind(name.value_or(""));
   return read_digests(query);
 }
 

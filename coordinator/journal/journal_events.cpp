@@ -1,11 +1,21 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "coordinator/journal/journal.h"
 
 namespace baton {
+namespace {
+
+/// Whether it ends what a grant or an arrival began.
+bool is_end(FarmEventKind kind) {
+  return (kind >= FarmEventKind::task_done && kind <= FarmEventKind::task_revoked) ||
+         kind == FarmEventKind::worker_left || kind == FarmEventKind::worker_lost;
+}
+
+}  // namespace
 
 Result<std::vector<JobVersion>> Journal::versions() {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT document, id, number FROM versions "
@@ -165,6 +175,34 @@ Result<std::vector<FarmEvent>> Journal::events(const EventQuery& wanted) {
     }
     events.push_back(std::move(event));
   }
+}
+
+Result<std::vector<FarmEvent>> Journal::events_without_end() {
+  BATON_ASSIGN(SqlStatement start,
+               database_.prepare("SELECT max(sequence) FROM events WHERE kind = ?"));
+  BATON_ASSIGN(const bool row, start.bind(FarmEventKind::coordinator_started).step());
+  EventQuery next{.after_sequence = row ? start.integer(0) : 0, .count = 10000, .is_newest = false};
+  std::map<std::string, FarmEvent> begun;
+  while (true) {
+    BATON_ASSIGN(const std::vector<FarmEvent> events, this->events(next));
+    for (const FarmEvent& event : events) {
+      const TaskPlace& task = event.task;
+      const std::string key =
+          event.has_task ? fmt::format("{} {} {} {} {} {} {}", event.job.hex(),
+                                       static_cast<int>(task.kind), task.first.value(),
+                                       task.last.value(), task.tile, task.attempt, event.worker)
+                         : event.worker;
+      if (event.kind == FarmEventKind::task_granted || event.kind == FarmEventKind::worker_joined)
+        begun[key] = event;
+      if (is_end(event.kind)) begun.erase(key);
+    }
+    if (events.empty()) break;
+    next.after_sequence = events.back().sequence;
+  }
+  std::vector<FarmEvent> open;
+  for (auto& [key, event] : begun) open.push_back(std::move(event));
+  std::ranges::sort(open, {}, &FarmEvent::sequence);
+  return open;
 }
 
 Result<std::map<FarmEventKind, EventSum>> Journal::event_sums(const JobId& job) {

@@ -273,6 +273,12 @@ struct TellLeaseEnd {
   TimePoint granted_at;
   std::string reason;  ///< for people; may be empty
 };
+/// For the history: the worker goes on with a lease that had ended, or was an earlier
+/// coordinator's.
+struct TellLeaseTaken {
+  LeaseId lease;
+  std::string worker;
+};
 /// Somebody waits for states that the worker holds: it should put them into the store.
 struct AskForStates {
   std::string worker;
@@ -303,9 +309,9 @@ struct RemoveBlobs {
   std::vector<Digest> blobs;
 };
 
-using Action =
-    std::variant<RecordCompletion, RecordOutputs, RecordFailure, RecordReopened, RecordJobStatus,
-                 RecordRenderer, InspectFrames, GrantLease, TellLeaseEnd, AskForStates, RevokeLease,
-                 ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
+using Action = std::variant<RecordCompletion, RecordOutputs, RecordFailure, RecordReopened,
+                            RecordJobStatus, RecordRenderer, InspectFrames, GrantLease,
+                            TellLeaseEnd, TellLeaseTaken, AskForStates, RevokeLease, ReportNoWork,
+                            ForgetWorker, ReportConflict, RemoveBlobs>;
 
 }  // namespace baton

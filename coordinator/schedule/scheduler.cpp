@@ -164,7 +164,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   std::vector<BlobRef> outputs = event.made.outputs;
 
   // A report that nobody waits for is ignored, but it must agree with what was reported before.
-  const Claim claim = find_claim(event.worker, event.lease, now);
+  const Claim claim = find_claim(event.worker, event.lease, now, actions);
   if (!claim.job) {
     const Job* job = find_job(event.lease.job);
     const auto task = job ? job->tasks.graph().find(event.lease.task) : std::nullopt;
@@ -237,13 +237,13 @@ bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<Bl
 void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) {
   const Failure& failure = event.failure;
   if (!leases_.touch(failure.worker, now)) return;
-  const Claim claim = find_claim(failure.worker, failure.lease, now);
+  const Claim claim = find_claim(failure.worker, failure.lease, now, actions);
   if (claim.job) fail_attempt(claim, failure, now, actions);
 }
 
 void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
-  if (const Claim claim = find_claim(event.worker, event.lease, now); claim.job) {
+  if (const Claim claim = find_claim(event.worker, event.lease, now, actions); claim.job) {
     claim.job->tasks.attempts().add_returned(claim.task, event.lease, event.worker);
     lose_lease(event.lease.job, claim.task, "what it made is gone", actions);
   }
@@ -252,7 +252,7 @@ void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) 
 
 void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
-  const Claim claim = find_claim(event.worker, event.lease, now);
+  const Claim claim = find_claim(event.worker, event.lease, now, actions);
   if (!claim.job) return;
   return_lease(claim, event.lease, event.message, actions);
   claim.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = now + kRest;
@@ -266,7 +266,7 @@ void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions& actions) 
   if (!leases_.touch(event.worker, now)) return;
   if (Job* job = find(event.lease.job); job != nullptr && !event.unseen.empty())
     job->standings.add_blind(event.worker, event.unseen, now);
-  const Claim claim = find_claim(event.worker, event.lease, now);
+  const Claim claim = find_claim(event.worker, event.lease, now, actions);
   if (claim.job)
     return_lease(claim, event.lease,
                  event.unseen.empty() ? "no time left" : "does not see " + event.unseen, actions);
@@ -274,7 +274,7 @@ void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions& actions) 
 
 void Scheduler::on(const PlaceTaken& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
-  const Claim claim = find_claim(event.worker, event.lease, now);
+  const Claim claim = find_claim(event.worker, event.lease, now, actions);
   if (!claim.job) return;
   if (!event.stays) {
     return_lease(claim, event.lease, "a picture in its frame's place may be replaced", actions);
@@ -289,7 +289,7 @@ void Scheduler::on(const PlaceTaken& event, TimePoint now, Actions& actions) {
 
 void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
-  const Claim claim = find_claim(event.worker, event.lease, now);
+  const Claim claim = find_claim(event.worker, event.lease, now, actions);
   if (!claim.job) return;
   JobTasks& tasks = claim.job->tasks;
   std::vector<TaskKey> makers;

@@ -152,7 +152,8 @@ class Scheduler {
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
   // Leases (scheduler_leases.cpp).
-  Claim find_claim(const std::string& worker, const LeaseId& lease, TimePoint now);
+  Claim find_claim(const std::string& worker, const LeaseId& lease, TimePoint now,
+                   Actions& actions);
   void reconcile(const std::string& worker, const std::vector<LeaseId>& named,
                  TimePoint granted_until, TimePoint now, Actions& actions);
   Lease& add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now);

@@ -84,7 +84,7 @@ double Scheduler::longest_task_seconds() const {
 /// coordinator, is taken up again while nobody else has the task or holds what it was made of. No
 /// job in the answer: the lease is over.
 Scheduler::Claim Scheduler::find_claim(const std::string& worker, const LeaseId& lease,
-                                       TimePoint now) {
+                                       TimePoint now, Actions& actions) {
   Job* job = find(lease.job);
   if (!job || !is_open(job->status)) return {};
   const std::optional<TaskIndex> task = job->tasks.graph().find(lease.task);
@@ -100,6 +100,7 @@ Scheduler::Claim Scheduler::find_claim(const std::string& worker, const LeaseId&
     return {};
   job->tasks.grant(*task);
   add_lease(worker, lease, *task, now);
+  actions.push_back(TellLeaseTaken{lease, worker});
   return {job, *task};
 }
 
@@ -116,7 +117,7 @@ void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>&
 
   // What it names it keeps, if nobody else has it.
   for (const LeaseId& lease : in_hand) {
-    if (!find_claim(worker, lease, now).job) actions.push_back(RevokeLease{worker, lease});
+    if (!find_claim(worker, lease, now, actions).job) actions.push_back(RevokeLease{worker, lease});
   }
 }
 

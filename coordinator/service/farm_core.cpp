@@ -238,6 +238,11 @@ Status FarmCore::perform(const TellLeaseEnd& action) {
   return history.lease_ended(scheduler.find_job(action.lease.job), action);
 }
 
+Status FarmCore::perform(const TellLeaseTaken& action) {
+  return history.granted(*scheduler.find_job(action.lease.job), action.lease, action.worker,
+                         "goes on with it");
+}
+
 Status FarmCore::perform(const AskForStates& action) {
   return reply_to(action.worker, RequestStates{action.job, action.states});
 }
@@ -303,6 +308,17 @@ Status FarmCore::give_up(const Digest& job, const std::vector<FramesInDoubt::Fra
   records_.erase(job);
   for (const FramesInDoubt::Frame& frame : frames)
     BATON_TRY(journal.record_given_up(frame.file, frame.digest));
+  return {};
+}
+
+Status FarmCore::take_back(const Digest& job, const JobSpec& spec,
+                           const std::vector<FrameNumber>& frames) {
+  records_.erase(job);
+  for (const FrameNumber frame : frames) {
+    const fs::path path =
+        fs::path(spec.output.directory) / frame_file_name(spec.output.pattern, frame.value());
+    BATON_TRY(journal.record_given_up(path, std::nullopt));
+  }
   return {};
 }
 

@@ -114,6 +114,8 @@ class FarmCore {
                            const std::filesystem::path& path, const FileVerdict& picture);
   /// A person has said that the job may replace these.
   Status give_up(const Digest& job, const std::vector<FramesInDoubt::Frame>& frames);
+  /// It may not any more.
+  Status take_back(const Digest& job, const JobSpec& spec, const std::vector<FrameNumber>& frames);
   /// Takes up the marks of a coordinator before this one.
   Status take_up_marks();
   /// The document for replays outlives its job only if that has failed.
@@ -144,6 +146,7 @@ class FarmCore {
   Status perform(const InspectFrames& action);
   Status perform(const GrantLease& action);
   Status perform(const TellLeaseEnd& action);
+  Status perform(const TellLeaseTaken& action);
   Status perform(const AskForStates& action);
   Status perform(const RevokeLease& action);
   Status perform(const ReportNoWork& action);

@@ -85,8 +85,8 @@ FileContent FileReader::read(const FileToRead& file) const {
     return content;
   }
   if (file.expected.empty() && !file.is_frame) return content;
-  const bool is_expected = std::ranges::find(file.expected, *content.digest) != file.expected.end();
-  content.writer = is_expected ? std::optional(std::string()) : disk_.picture_writer(file.path);
+  content.is_expected = std::ranges::find(file.expected, *content.digest) != file.expected.end();
+  if (!content.is_expected) content.writer = disk_.picture_writer(file.path);
   return content;
 }
 

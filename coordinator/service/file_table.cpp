@@ -21,6 +21,7 @@ FileVerdict judge_content(const FileContent* content, const BlobRef& recorded) {
   if (!content->stamp) return {FileState::absent};
   if (!content->digest) return {FileState::unknown};
   if (content->digest == recorded.digest) return {FileState::right};
+  if (content->is_expected) return {FileState::unknown};  // by somebody else
   if (!content->writer) return {FileState::damaged};
   return {FileState::strange, {}, *content->digest, *content->writer};
 }

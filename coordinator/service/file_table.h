@@ -22,9 +22,10 @@ struct FileContent {
   std::optional<Digest> digest;  ///< nullopt: it was not read
   /// Why it could not be looked at or read, with its name.
   std::string fault;
-  /// The job in the header of a frame that is a whole picture; empty where there is none, or the
-  /// digest is one that was expected.
+  /// The job in the header of a frame that is a whole picture; empty where there is none.
   std::optional<std::string> writer = {};
+  /// The digest is one that was expected, so that nobody looked for the writer.
+  bool is_expected = false;
 };
 
 /// How a file stands beside what was recorded when it was written.

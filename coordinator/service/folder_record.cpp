@@ -8,6 +8,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
+#include "coordinator/service/farm_document.h"
 
 namespace baton {
 
@@ -21,7 +22,7 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& fol
   BATON_ASSIGN(const std::vector<Digest> jobs, journal.jobs_in(folder));
   for (const Digest& other : jobs) {
     BATON_ASSIGN(const std::optional<std::string> text, journal.document(other));
-    const Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
+    const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
     if (!document) continue;
     record.jobs_.push_back(other);
     BATON_TRY(journal.for_each_completion(other, [&](const Completion& done) -> Status {

@@ -55,6 +55,14 @@ TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t
 
 Status History::read() {
   BATON_ASSIGN(jobs_, IdentityBook::read(journal_));
+  BATON_ASSIGN(const std::vector<FarmEvent> begun, journal_.events_without_end());
+  for (FarmEvent event : begun) {
+    const bool is_task = event.kind == FarmEventKind::task_granted;
+    event.kind = is_task ? FarmEventKind::task_lost : FarmEventKind::worker_lost;
+    event.reason = "the coordinator had ended";
+    event.seconds = is_task ? static_cast<double>(now_ms() - event.time_ms) / 1000 : 0;
+    BATON_TRY(tell(std::move(event)));
+  }
   return {};
 }
 
@@ -75,6 +83,7 @@ Status History::submitted(const Digest& document, const JobId& job, const std::s
   if (!jobs_.is_newest(document)) BATON_TRY(jobs_.add_version(journal_, document, job));
   JobTimes times = jobs_.of(document).times;
   if (times.submitted_ms == 0) times.submitted_ms = now_ms();
+  if (times.ended_ms != 0) times.started_ms = 0;
   times.ended_ms = 0;
   BATON_TRY(jobs_.set_times(journal_, job, times));
   return tell({.kind = is_changed ? FarmEventKind::job_changed : FarmEventKind::job_submitted,
@@ -110,8 +119,8 @@ Status History::locked(const Digest& version, const std::vector<FrameNumber>& fr
                .reason = "frames " + format_frames(frames)});
 }
 
-Status History::granted(const Scheduler::Job& job, const LeaseId& lease,
-                        const std::string& worker) {
+Status History::granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker,
+                        const std::string& reason) {
   const JobIdentity who = jobs_.of(lease.job);
   if (who.times.started_ms == 0) {
     JobTimes times = who.times;
@@ -122,7 +131,8 @@ Status History::granted(const Scheduler::Job& job, const LeaseId& lease,
                .job = who.id,
                .has_task = true,
                .task = place_of(job, lease.task, lease.attempt),
-               .worker = worker});
+               .worker = worker,
+               .reason = reason});
 }
 
 Status History::lease_ended(const Scheduler::Job* job, const TellLeaseEnd& end) {

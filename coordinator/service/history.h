@@ -17,7 +17,8 @@ class History {
  public:
   /// journal: outlives the history.
   explicit History(Journal& journal) : journal_(journal) {}
-  /// Takes up who the journal's jobs are.
+  /// Takes up who the journal's jobs are. What tasks and workers of an earlier coordinator have no
+  /// end in the journal gets one: it was killed, and what goes on will say so.
   Status read();
 
   /// Who does what is told from now on: a key's name, or a worker's; empty: the coordinator itself,
@@ -33,7 +34,8 @@ class History {
   Status deleted(const Digest& version);
   /// Frames of the job count as done from now on, or no longer.
   Status locked(const Digest& version, const std::vector<FrameNumber>& frames, bool is_locked);
-  Status granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker);
+  Status granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker,
+                 const std::string& reason = {});
   /// job: null: it is forgotten.
   Status lease_ended(const Scheduler::Job* job, const TellLeaseEnd& end);
   Status reopened(const RecordReopened& tasks);

@@ -67,10 +67,11 @@ std::vector<PeerId> Peers::connections() const {
 }
 
 const WorkerHello* Peers::find_other_renderer(const WorkerHello& hello) const {
-  const auto other = std::find_if(workers_.begin(), workers_.end(), [&](const auto& worker) {
-    return worker.second.hello.renderer != hello.renderer;
-  });
-  return other == workers_.end() ? nullptr : &other->second.hello;
+  const auto renders_alike = [&](const auto& worker) {
+    return worker.second.hello.renderer == hello.renderer;
+  };
+  if (workers_.empty() || std::ranges::any_of(workers_, renders_alike)) return nullptr;
+  return &workers_.begin()->second.hello;
 }
 
 bool OncePerPeer::first(const PeerId& peer) {

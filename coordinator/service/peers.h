@@ -32,7 +32,7 @@ class Peers {
   /// By name, without their tasks.
   std::vector<WorkerSummary> summaries() const;
   std::vector<PeerId> connections() const;
-  /// A connected worker that renders with something else; null: there is none.
+  /// A connected worker, where none renders as this one does; null: one does, or nobody is there.
   const WorkerHello* find_other_renderer(const WorkerHello& hello) const;
 
  private:

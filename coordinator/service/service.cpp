@@ -33,6 +33,9 @@ Status check_leases(const std::vector<LeaseId>& running) {
                fmt::format("{} leases in hand, a worker has at most {}", running.size(), kMost)};
 }
 
+/// As Scheduler::Job::renderer has it.
+std::string renderer_of(const WorkerHello& hello) { return hello.renderer + ", " + hello.build; }
+
 }  // namespace
 
 // ---- the loop -----------------------------------------------------------------------------------
@@ -130,8 +133,8 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
       tell("refused: " + *difference);
       return farm_.refuse(
           peer, {ErrorKind::version,
-                 fmt::format("{}; pixels may differ: use one build on all machines, or start "
-                             "the coordinator with --mixed-builds",
+                 fmt::format("{}; pixels may differ: use one build and --isa on all machines, "
+                             "or start the coordinator with --mixed-builds",
                              *difference)});
     }
     if (is_new) spdlog::warn("{}: results may differ", *difference);
@@ -152,8 +155,7 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   BATON_TRY(farm_.history.happened(
       FarmEventKind::worker_joined, hello.worker_id,
       fmt::format("{} threads on {}, {}", hello.num_threads, hello.host, hello.renderer)));
-  return farm_.step(
-      WorkerJoined{hello.worker_id, hello.running, hello.renderer + ", " + hello.build});
+  return farm_.step(WorkerJoined{hello.worker_id, hello.running, renderer_of(hello)});
 }
 
 /// Says where pixels of the worker may differ from those of the others; nullopt: nowhere.
@@ -161,6 +163,13 @@ std::optional<std::string> Service::other_build(const WorkerHello& hello) const 
   if (hello.build != build_identity())
     return fmt::format("worker {} is {}, the coordinator {}", hello.worker_id, hello.build,
                        build_identity());
+  // Unlike machines do different jobs: who can go on with one that is open is let in.
+  const std::vector<Digest> jobs = farm_.scheduler.jobs();
+  const bool is_needed = std::ranges::any_of(jobs, [&](const Digest& digest) {
+    const Scheduler::Job& job = *farm_.scheduler.find_job(digest);
+    return is_open(job.status) && job.renderer == renderer_of(hello);
+  });
+  if (is_needed) return std::nullopt;
   if (const WorkerHello* const other = farm_.peers.find_other_renderer(hello))
     return fmt::format("worker {} renders with {}, worker {} with {}", hello.worker_id,
                        hello.renderer, other->worker_id, other->renderer);

@@ -42,7 +42,7 @@ Status Service::keep_frame_file(const TaskDone& report, const ReportedFrame& fra
   const auto task = job ? job->tasks.graph().find(report.lease.task) : std::nullopt;
   if (!task || job->tasks.made().outputs(*task) != report.made.outputs) return {};
   const FileStamp stamp = frame.stamp.value().value();
-  files_.add({frame.path, stamp, frame.digest, {}, std::string()});
+  files_.add({frame.path, stamp, frame.digest, {}, report.lease.job.hex()});
   BATON_TRY(farm_.journal.record_given_up(frame.path, std::nullopt));
   return farm_.journal.record_frame_file(report.lease.job,
                                          {report.lease.task.frame(), frame.digest, stamp});

@@ -12,6 +12,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
+#include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/plan_text.h"
 #include "coordinator/service/service.h"
@@ -81,7 +82,7 @@ Status Service::clean_up() {
 
 Status Service::restore_job(const Digest& digest) {
   BATON_ASSIGN(JournalledJob known, farm_.journal.load(digest));
-  Result<ParsedJobDocument> document = parse_job_document(known.document);
+  Result<ParsedJobDocument> document = parse_farm_document(known.document);
   if (!document) {
     spdlog::error("job {} of the journal cannot be read and is left out: {}",
                   farm_.history.name_of(digest), document.error().message);
@@ -170,7 +171,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   // Jobs that ended in this turn of the loop are read from the archive, too.
   BATON_TRY(farm_.archive_ended());
   // A job that cannot be run is refused before it leaves a trace.
-  Result<ParsedJobDocument> document = parse_job_document(message.json);
+  Result<ParsedJobDocument> document = parse_farm_document(message.json);
   if (!document) return farm_.refuse(peer, document.error());
   if (const Status within = check_roots(*document, farm_.options.roots); !within) {
     spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
@@ -180,7 +181,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   SubmitJob wanted = message;
   BATON_ASSIGN(wanted.json,
                submission.with_written_sweeps(*document, message.json, message.restart));
-  if (wanted.json != message.json) document = parse_job_document(wanted.json);
+  if (wanted.json != message.json) document = parse_farm_document(wanted.json);
   if (!document) return farm_.refuse(peer, document.error());
   if (const std::int64_t count = count_tasks(document->job); count > limits::kMaxTasksPerJob) {
     return farm_.refuse(
@@ -281,8 +282,11 @@ Status Service::receive(const PeerId& peer, const ListEvents& message) {
   query.count = std::clamp(query.count, 1, limits::kMaxEventsTold);
   if (!message.job.empty()) {
     const Result<Digest> version = resolve(message.job);
-    if (!version) return farm_.refuse(peer, version.error());
-    query.job = farm_.history.jobs().of(*version).id;
+    // One that was deleted is known to the history alone.
+    const std::optional<JobId> deleted = version ? std::nullopt : JobId::from_hex(message.job);
+    query.job = version ? farm_.history.jobs().of(*version).id : deleted.value_or(JobId());
+    BATON_ASSIGN(const auto any, farm_.journal.events({.job = query.job, .count = 1}));
+    if (!version && (!deleted || any.empty())) return farm_.refuse(peer, version.error());
   }
   EventList list;
   BATON_ASSIGN(list.events, farm_.journal.events(query));
@@ -308,6 +312,10 @@ Status Service::receive(const PeerId& peer, const ShowJob& message) {
 }
 
 Status Service::receive(const PeerId& peer, const CancelJob& message) {
+  if (const Result<Digest> job = resolve_own(message.job)) {
+    const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
+    if (known != nullptr) BATON_TRY(farm_.take_back(*job, known->spec, known->spec.frames));
+  }
   return change_job<JobCancelled>(peer, message.job);
 }
 
@@ -346,7 +354,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   const Result<Digest> job = resolve_own(message.job);
   if (!job) return farm_.refuse(peer, job.error());
   BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
-  const Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
+  const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
   if (!document) return farm_.refuse(peer, document.error());
   std::vector<FrameNumber> frames = message.frames;
   std::ranges::sort(frames);
@@ -363,6 +371,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
     places = std::move(found).value();
   }
   BATON_TRY(farm_.history.locked(*job, frames, !message.off));
+  BATON_TRY(farm_.take_back(*job, document->job, frames));
   spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));

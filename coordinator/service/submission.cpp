@@ -14,6 +14,7 @@
 #include "common/job/plan/next_sweeps.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
+#include "coordinator/service/farm_document.h"
 #include "coordinator/service/neighbour.h"
 #include "coordinator/service/plan_text.h"
 
@@ -31,7 +32,7 @@ Result<std::vector<Submission::InFolder>*> Submission::jobs_in(const std::string
   BATON_ASSIGN(const std::vector<Digest> jobs, farm_.journal.jobs_in(folder));
   for (const Digest& job : jobs) {
     BATON_ASSIGN(JournalledJob known, farm_.journal.load(job));
-    Result<ParsedJobDocument> document = parse_job_document(known.document);
+    Result<ParsedJobDocument> document = parse_farm_document(known.document);
     if (!document) continue;
     FormerJob former{std::move(document).value(),
                      std::move(known.completions.tasks),
@@ -247,13 +248,26 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   Heritage heritage;
   BATON_ASSIGN(const auto* neighbours, jobs_in(folder_of(document.job)));
   std::vector<FormerJob> formers;
+  // Where frames of a job are by one renderer, that of the newest which has frames decides.
+  std::string newest;
+  bool has_frames = false;
+  for (const auto& [digest, former] : *neighbours) {
+    if (!(former.document.picture == document.picture) || former.renderer.empty()) continue;
+    const bool has_some = std::ranges::any_of(former.tasks, [](const Completions::Task& task) {
+      return task.task.kind == TaskKind::assemble;
+    });
+    if (has_frames && !has_some) continue;
+    newest = former.renderer;
+    has_frames = has_some;
+  }
   for (auto& [digest, former] : *neighbours) {
     if (!(former.document.picture == document.picture)) continue;
-    if (restart && farm_.scheduler.leases().nobody_renders_as(former.renderer)) {
+    const bool is_other =
+        !farm_.options.mixed_builds && !former.renderer.empty() && former.renderer != newest;
+    if (is_other || (restart && farm_.scheduler.leases().nobody_renders_as(former.renderer))) {
       reasons.push_back("nothing is kept that was rendered with " + former.renderer);
       continue;
     }
-    if (!former.renderer.empty()) heritage.renderer = former.renderer;
     formers.push_back(std::move(former));
     heritage.formers.push_back(digest);
   }
@@ -279,7 +293,11 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   }
   if (adoption.lost.size() > kMost)
     reasons.push_back(fmt::format("and {} frames more", adoption.lost.size() - kMost));
-  if (!adoption.former && adoption.frames.empty()) heritage.renderer.clear();
+  if (adoption.former) {
+    heritage.renderer = formers[*adoption.former].renderer;
+  } else if (!adoption.frames.empty() && !farm_.options.mixed_builds) {
+    heritage.renderer = newest;
+  }
   return heritage;
 }
 

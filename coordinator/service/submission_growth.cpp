@@ -9,6 +9,7 @@
 #include "common/base/utc.h"
 #include "common/job/plan/next_sweeps.h"
 #include "common/job/plan/sequence.h"
+#include "coordinator/service/farm_document.h"
 #include "coordinator/service/submission.h"
 
 namespace baton {
@@ -59,7 +60,8 @@ Result<std::string> Submission::with_written_sweeps(const ParsedJobDocument& doc
       if (as_before == quality) sweeps = std::max(sweeps, open->spec.quality.sweeps);
     }
   }
-  return with_sweeps(document, std::max(sweeps, quality.sweeps));
+  BATON_ASSIGN(ParsedJobDocument as_written, parse_job_document(text));
+  return with_sweeps(std::move(as_written), std::max(sweeps, quality.sweeps));
 }
 
 /// A person submits it: its time and the number of its sweeps count from now on. What was decided
@@ -120,7 +122,7 @@ Status Submission::add_sweeps(const Digest& version, int sweeps, const std::stri
   BATON_ASSIGN(const std::optional<std::string> before, farm_.journal.document(version));
   BATON_ASSIGN(ParsedJobDocument former, parse_job_document(before.value_or("")));
   const std::string text = with_sweeps(std::move(former), sweeps);
-  BATON_ASSIGN(const ParsedJobDocument document, parse_job_document(text));
+  BATON_ASSIGN(const ParsedJobDocument document, parse_farm_document(text));
   if (const std::int64_t count = count_tasks(document.job); count > limits::kMaxTasksPerJob)
     return Error{ErrorKind::bad_input, fmt::format("{} sweeps have {} tasks, at most {}", sweeps,
                                                    count, limits::kMaxTasksPerJob)};

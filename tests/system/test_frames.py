@@ -330,6 +330,30 @@ def a_picture_that_comes_before_its_frame_is_kept(programs, folder):
     check_equal(programs.pixels(folder / "frames"), _undisturbed(programs, folder), "pixels after --restart")
 
 
+def who_gave_a_picture_up_may_take_that_back(programs, folder):
+    """--restart lets a painted frame go until the job is cancelled, or the frame is locked."""
+    def painted_job(place):
+        programs.render(make(place / "other", seed=77), place / "other/work", threads=2)
+        return frame(place / "other", 2).read_bytes()
+
+    for how in ("cancelled", "locked"):
+        place = folder / how
+        painted = painted_job(place)
+        with Farm(programs, place / "farm") as farm:
+            ident = begin(farm, place)
+            frame(place, 2).write_bytes(painted)
+            farm.baton("job", "cancel", ident)
+            farm.baton("job", "submit", place / "job.json", "--restart")
+            if how == "cancelled":
+                farm.baton("job", "cancel", ident)
+            else:
+                farm.baton("job", "lock", ident, "--frames", "2")
+                finish(farm, ident)
+                farm.baton("job", "lock", ident, "--frames", "2", "--off")
+            check_says(farm.baton("job", "submit", place / "job.json", expect=IO).stderr, "frame.0002.exr is not what a job has written")
+            check_equal(frame(place, 2).read_bytes(), painted, f"the painted frame, {how}")
+
+
 def a_locked_frame_is_not_written_by_a_worker_that_was_silent(programs, folder):
     """It was stopped while it wrote the frame, and lost its lease."""
     large = {"image": {"width": 640, "height": 400, "tileSize": 128}, "state": {"carry": False},

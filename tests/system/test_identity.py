@@ -150,6 +150,58 @@ def another_picture(programs, folder):
     check_equal(programs.pixels(folder / FOLDER), witness(programs, folder / "all", "1-6", seed=8), "pixels")
 
 
+def a_folder_has_one_name(programs, folder):
+    """However a document writes it: the same job, whose locks hold, and no second writer."""
+    names = ["frames", "frames/", "./frames/.", "../one/frames", "link"]
+    place = folder / "one"
+    place.mkdir(parents=True)
+    (place / "link").symlink_to(place / "frames")
+    with Farm(programs, place / "farm") as farm:
+        def submit(output, *extra, expect=OK, **changes):
+            job = small_job(place, "1-2", **changes)
+            job["output"]["directory"] = f"{place}/{output}"
+            return farm.baton("job", "submit", write_job(place / "job.json", job), "--json", *extra, expect=expect)
+
+        worker = farm.start_worker()
+        ident = json.loads(submit(names[0]).stdout)["id"]
+        farm.wait_for(ident)
+        before = files(place)
+        for name in names[1:]:
+            check_says(submit(name).stdout, ident, "frames 1-2 are kept")
+            farm.wait_for(ident)
+        check_equal(files(place), before, "frames")
+
+        # Nobody else writes there.
+        worker.terminate()
+        worker.wait()
+        submit("link/", seed=9, expect=BAD_INPUT)
+        submit("frames", "--restart", seed=9)
+        check_says(submit("./frames", name="another", seed=10, expect=None).stderr, "frames")
+        farm.baton("job", "cancel", ident)
+        farm.baton("job", "lock", ident, "--frames", "2")
+        check_says(submit("link", "--restart", name="another", seed=10, expect=BAD_INPUT).stderr, "are locked in job")
+        farm.start_worker()
+        submit("frames/", "--restart", seed=9)
+        farm.wait_for(ident)
+        check_equal(files(place)[2], before[2], "the locked frame")
+        check(files(place)[1] != before[1], "the other frame is of another picture")
+
+
+def a_deleted_job_may_come_again(programs, folder):
+    """Its frames are those of its own document; its history can be asked for by its ID."""
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_worker()
+        path = write_job(folder / "job.json", small_job(folder, "1-2"))
+        ident = farm.submit(path)
+        farm.wait_for(ident)
+        before = programs.pixels(folder / FOLDER)
+        farm.baton("job", "delete", ident)
+        check_says(farm.baton("farm", "events", "--job", ident).stdout, "job deleted")
+        farm.baton("farm", "events", "--job", "0123456789abcdef", expect=BAD_INPUT)
+        farm.wait_for(farm.submit(path))
+        check_equal(programs.pixels(folder / FOLDER), before, "pixels")
+
+
 def a_key_of_later_frames(programs, folder):
     """A changed key leaves the frames before it as they are."""
     keys = [{"frame": frame, "position": [0.1 * frame, 1.2, 5], "lookAt": [0, 0.6, 0]} for frame in (1, 3, 6)]

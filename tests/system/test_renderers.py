@@ -62,6 +62,57 @@ def another_instruction_set_does_not_go_on(programs, folder):
     check_equal(programs.pixels(folder / "frames"), programs.pixels(witness / "frames"), "pixels")
 
 
+def who_can_go_on_is_let_in(programs, folder):
+    """Though others are there, which have nothing to do."""
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    best, least = sets[-1], sets[0]
+    path = make(folder, sampling={"numCandidates": 512, "numDistributions": 48})
+    with Farm(programs, folder / "farm") as farm:
+        worker = farm.start_worker(extra=("--isa", best))
+        ident = farm.submit(path)
+        wait_until(lambda: farm.show(ident)["framesDone"] >= 1, "a frame is done")
+        worker.kill()
+        wait_until(lambda: "is silent" in farm.coordinator.log(), "it is missed")
+        farm.start_worker(extra=("--isa", least))
+        wait_until(lambda: farm.show(ident).get("waits"), "it waits")
+        again = farm.start_worker(extra=("--isa", best))
+        farm.wait_for(ident)
+        check(again.alive(), "it was let in")
+    makers = {renderer_of(frame) for frame in (folder / "frames").glob("*.exr")}
+    check_equal(len(makers), 1, f"renderers of the frames, {makers}")
+
+
+def what_is_kept_is_by_one(programs, folder):
+    """Versions of a job by two instruction sets: the next one goes on from the newest that has frames, with its set."""
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    best, least = sets[-1], sets[0]
+    small = {"image": {"tileSize": 64}, "sampling": {"numCandidates": 128}}
+    for name, first, second, third in (
+            ("frames", {"frames": "1-4"}, {"frames": "1-2"}, {"frames": "1-6"}),
+            ("sweeps", *({"state": {"carry": False}, "quality": {"sweeps": sweeps, "refinable": True}} for sweeps in (2, 1, 3)))):
+        place = folder / name
+        witness = place / "witness"
+        expected = programs.rendered(witness, make_job(witness, **{**small, "frames": f"1-{FRAMES}", **third}), extra=("--isa", least))
+        with Farm(programs, place / "farm") as farm:
+            worker = farm.start_worker(extra=("--isa", best))
+            ident = farm.submit(make(place, **{**small, **first}))
+            farm.wait_for(ident)
+            worker.terminate()
+            worker.wait()
+            farm.start_worker(extra=("--isa", least))
+            wait_until(lambda: "joined" in farm.workers[-1].log() or farm.coordinator.log().count("joined") == 2, "it is there")
+            farm.baton("job", "submit", make(place, **{**small, **second}), "--restart")
+            farm.wait_for(ident)
+            said = farm.baton("job", "submit", make(place, **{**small, **third}))
+            check_says(said.stderr + said.stdout, "nothing is kept that was rendered with")
+            farm.wait_for(ident)
+        check_equal(programs.pixels(place / "frames"), expected, f"pixels, {name}")
+
+
 def with_mixed_builds_a_frame_is_by_one(programs, folder):
     """Two machines that are not alike: who began goes on while it is there; then the other makes the frames that are not
     done, whole, and their headers name it."""

@@ -374,7 +374,10 @@ class ChaosFarm {
   }
   void on(const InspectFrames&) { inspects_ = true; }
   void on(const GrantLease& a);
-  void on(const TellLeaseEnd& a) { granted_.erase(a.lease); }
+  void on(const TellLeaseEnd& a) {
+    EXPECT_EQ(granted_.erase(a.lease), 1u) << "an end of what was not told to have begun";
+  }
+  void on(const TellLeaseTaken& a) { EXPECT_TRUE(granted_.insert(a.lease).second); }
   /// Every grant of this coordinator has an end that was told, unless somebody has it.
   void check_grants() const {
     std::set<LeaseId> leased;

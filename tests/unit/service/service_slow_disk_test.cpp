@@ -319,7 +319,7 @@ TEST_F(FileTableTest, OnlyWhatHasChangedIsRead) {
   EXPECT_EQ(num_read, 0);
   FileStamp older = stamp;
   --older.time_ns;
-  EXPECT_EQ(read_one({file, {frame.digest}, older}).writer, "");
+  EXPECT_EQ(read_one({file, {frame.digest}, older}).writer, std::nullopt);
   EXPECT_EQ(num_read, 1);
   EXPECT_EQ(num_decoded, 0);
   EXPECT_EQ(read_one({file, {digest_of("others")}, stamp}).digest, digest_of("others"))
