@@ -32,16 +32,19 @@ Status write_token(const std::filesystem::path& file, const std::string& token,
   return write_file_atomic(file, as_bytes_view(text));
 }
 
-Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token) {
-  const Result<std::string> found = read_text_file(file, kMaxTokenBytes);
+Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token,
+                                     Patience* patience) {
+  Result<std::string> found = read_text_file(file, kMaxTokenBytes);
+  // What cannot be read says nothing of the folder.
+  while (!found) {
+    const Status there = expect_file(file);
+    if (!there && there.error().kind == ErrorKind::bad_input) break;
+    const Error error{ErrorKind::io, found.error().message};
+    if (patience == nullptr || !patience->wait_after(error)) return error;
+    found = read_text_file(file, kMaxTokenBytes);
+  }
   if (found && *found == token) return std::string();
   if (found && found->starts_with(token + "\n")) return found->substr(token.size() + 1);
-  // What cannot be read says nothing of the folder.
-  if (!found) {
-    const Status there = expect_file(file);
-    if (there || there.error().kind == ErrorKind::io)
-      return Error{ErrorKind::io, found.error().message};
-  }
   return Error{
       ErrorKind::io,
       fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "
@@ -50,8 +53,9 @@ Result<std::string> read_after_token(const std::filesystem::path& file, const st
                   found ? "has another token" : "not there")};
 }
 
-Status expect_token(const std::filesystem::path& file, const std::string& token) {
-  const Result<std::string> line = read_after_token(file, token);
+Status expect_token(const std::filesystem::path& file, const std::string& token,
+                    Patience* patience) {
+  const Result<std::string> line = read_after_token(file, token, patience);
   return line ? Status() : line.error();
 }
 

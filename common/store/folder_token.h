@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/base/digest.h"
+#include "common/base/patiently.h"
 #include "common/base/result.h"
 
 namespace baton {
@@ -21,9 +22,12 @@ Result<std::string> make_token(const std::filesystem::path& file, const std::str
 Status write_token(const std::filesystem::path& file, const std::string& token,
                    const std::string& line = {});
 /// The line after the token; empty: there is none. The error, io, says that the token does not
-/// stand there and names the folder of `file`, or why the file cannot be read.
-Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token);
+/// stand there and names the folder of `file`, or why the file cannot be read; with patience that
+/// is looked at again.
+Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token,
+                                     Patience* patience = nullptr);
 /// The same error, or none.
-Status expect_token(const std::filesystem::path& file, const std::string& token);
+Status expect_token(const std::filesystem::path& file, const std::string& token,
+                    Patience* patience = nullptr);
 
 }  // namespace baton

@@ -133,8 +133,8 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
       tell("refused: " + *difference);
       return farm_.refuse(
           peer, {ErrorKind::version,
-                 fmt::format("{}; pixels may differ: use one build and --isa on all machines, "
-                             "or start the coordinator with --mixed-builds",
+                 fmt::format("{}; pixels may differ: use one build on all machines, or start "
+                             "the coordinator with --mixed-builds",
                              *difference)});
     }
     if (is_new) spdlog::warn("{}: results may differ", *difference);

@@ -171,12 +171,14 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   // Jobs that ended in this turn of the loop are read from the archive, too.
   BATON_TRY(farm_.archive_ended());
   // A job that cannot be run is refused before it leaves a trace.
-  Result<ParsedJobDocument> document = parse_farm_document(message.json);
-  if (!document) return farm_.refuse(peer, document.error());
-  if (const Status within = check_roots(*document, farm_.options.roots); !within) {
-    spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
+  const Result<ParsedJobDocument> as_written = parse_job_document(message.json);
+  if (!as_written) return farm_.refuse(peer, as_written.error());
+  if (const Status within = check_roots(*as_written, farm_.options.roots); !within) {
+    spdlog::warn("refused: job '{}': {}", as_written->job.name, within.error().message);
     return farm_.refuse(peer, within.error());
   }
+  Result<ParsedJobDocument> document = parse_farm_document(message.json);
+  if (!document) return farm_.refuse(peer, document.error());
   Submission submission(farm_, files_, speaker_);
   SubmitJob wanted = message;
   BATON_ASSIGN(wanted.json,
@@ -313,8 +315,12 @@ Status Service::receive(const PeerId& peer, const ShowJob& message) {
 
 Status Service::receive(const PeerId& peer, const CancelJob& message) {
   if (const Result<Digest> job = resolve_own(message.job)) {
-    const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
-    if (known != nullptr) BATON_TRY(farm_.take_back(*job, known->spec, known->spec.frames));
+    const JobId id = farm_.history.jobs().of(*job).id;
+    for (const Digest& version : farm_.history.jobs().versions(id)) {
+      BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(version));
+      const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+      if (document) BATON_TRY(farm_.take_back(version, document->job, document->job.frames));
+    }
   }
   return change_job<JobCancelled>(peer, message.job);
 }

@@ -307,10 +307,10 @@ class Worker {
   void perform(UseStore& action) {
     if (store_ && store_directory_ == action.directory) return;
     const std::filesystem::path folder = map_path(action.directory, machine_.maps);
-    Result<BlobStore> store = patiently([&]() -> Result<BlobStore> {
-      BATON_TRY(expect_token(folder / "token", action.token));
-      return BlobStore::open(folder);
-    });
+    Patience patience;
+    const Status seen = expect_token(folder / "token", action.token, &patience);
+    Result<BlobStore> store =
+        seen ? patiently([&] { return BlobStore::open(folder); }, patience) : seen.error();
     if (!store) {
       channel_.send(WorkerGoodbye{});
       leave_ = Leave{exit_code_of(store.error().kind), store.error().message};
