@@ -102,8 +102,7 @@ Status Service::restore_job(const Digest& digest) {
     BATON_ASSIGN(const std::vector<FrameFile> stood, farm_.journal.frame_files(digest));
     for (const FrameFile& file : stood) {
       if (file.frame >= FrameIndex(0) && file.frame.index() < event.spec.frames.size())
-        files_.add(
-            {frame_path(event.spec, file.frame), file.stamp, file.digest, {}, std::string()});
+        files_.add({frame_path(event.spec, file.frame), file.stamp, file.digest, {}, digest.hex()});
     }
     LostFiles lost = find_lost_files(event, farm_.store, files_, farm_.locked(digest, event.spec));
     while (lost.unreadable && std::chrono::steady_clock::now() < patient_until_) {

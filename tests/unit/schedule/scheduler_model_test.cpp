@@ -10,6 +10,19 @@ namespace {
 
 using namespace testing_farm;
 
+/// At rest or in motion, with and without state, a second pass or sweeps; nothing is given up.
+JobSpec job_of_any_kind(std::uint32_t seed) {
+  JobSpec spec =
+      small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4), seed % 3 != 0);
+  if (seed % 4 == 0) spec = moving_job(4, 8, 1 + static_cast<int>(seed % 9));
+  spec.visibility.correlated = seed % 3 == 1;
+  if (!spec.visibility.correlated && seed % 5 == 0)
+    spec.quality.sweeps = 2 + static_cast<int>(seed % 2);
+  spec.max_retries_per_task = 1000000;
+  spec.max_failures_per_worker = 1000000;
+  return spec;
+}
+
 /// Another job of the same picture.
 JobSpec changed(JobSpec job, std::uint32_t how) {
   job.quality.refinable = !job.visibility.correlated && how % 3 != 0;
@@ -38,15 +51,7 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
   std::size_t num_kept_frames = 0, num_cuts = 0, num_inspected_lost = 0;
   for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4),
-                             seed % 3 != 0);
-    if (seed % 4 == 0) spec = moving_job(4, 8, 1 + static_cast<int>(seed % 9));
-    spec.visibility.correlated = seed % 3 == 1;
-    if (!spec.visibility.correlated && seed % 5 == 0)
-      spec.quality.sweeps = 2 + static_cast<int>(seed % 2);
-    spec.max_retries_per_task = 1000000;
-    spec.max_failures_per_worker = 1000000;
-    ChaosFarm farm(seed, spec, {.alike = seed % 2 == 0});
+    ChaosFarm farm(seed, job_of_any_kind(seed), {.alike = seed % 2 == 0});
     // Some jobs are changed on the way, or after their end.
     int steps = 0;
     for (std::uint32_t change = 0; change < seed % 3; ++change) {
@@ -90,14 +95,7 @@ TEST(SchedulerModel, AFrameIsByOneRenderer) {
   std::size_t num_taken_over = 0, num_reopened = 0;
   for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    JobSpec spec = small_job(1 + static_cast<int>(seed % 4), 10, 1 + static_cast<int>(seed % 4),
-                             seed % 3 != 0);
-    if (seed % 4 == 0) spec = moving_job(4, 8, 1 + static_cast<int>(seed % 9));
-    spec.visibility.correlated = seed % 3 == 1;
-    if (!spec.visibility.correlated && seed % 5 == 0) spec.quality.sweeps = 2;
-    spec.max_retries_per_task = 1000000;
-    spec.max_failures_per_worker = 1000000;
-    ChaosFarm farm(seed, spec, {.num_workers = 2, .num_renderers = 2});
+    ChaosFarm farm(seed, job_of_any_kind(seed), {.num_workers = 2, .num_renderers = 2});
     int steps = 0;
     if (seed % 3 == 0) {
       for (; farm.status() == JobStatus::running && steps < 300; ++steps) farm.advance(true);
