@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <random>
+#include <utility>
 
 #include "common/base/files.h"
 
@@ -32,17 +34,33 @@ Status write_token(const std::filesystem::path& file, const std::string& token,
   return write_file_atomic(file, as_bytes_view(text));
 }
 
+namespace {
+
+/// nullopt: nothing has this name, or what has it is no file. Error, io: it cannot be read now.
+Result<std::optional<std::string>> read_if_there(const std::filesystem::path& file) {
+  Result<std::string> found = read_text_file(file, kMaxTokenBytes);
+  if (found) return std::optional(std::move(found).value());
+  const Status there = expect_file(file);
+  if (!there && there.error().kind == ErrorKind::bad_input) return std::optional<std::string>();
+  return Error{ErrorKind::io, found.error().message};
+}
+
+}  // namespace
+
+Result<bool> has_token(const std::filesystem::path& file, const std::string& token) {
+  BATON_ASSIGN(const std::optional<std::string> found, read_if_there(file));
+  return found && (*found == token || found->starts_with(token + "\n"));
+}
+
 Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token,
                                      Patience* patience) {
-  Result<std::string> found = read_text_file(file, kMaxTokenBytes);
+  Result<std::optional<std::string>> read = read_if_there(file);
   // What cannot be read says nothing of the folder.
-  while (!found) {
-    const Status there = expect_file(file);
-    if (!there && there.error().kind == ErrorKind::bad_input) break;
-    const Error error{ErrorKind::io, found.error().message};
-    if (patience == nullptr || !patience->wait_after(error)) return error;
-    found = read_text_file(file, kMaxTokenBytes);
+  while (!read) {
+    if (patience == nullptr || !patience->wait_after(read.error())) return read.error();
+    read = read_if_there(file);
   }
+  const std::optional<std::string>& found = *read;
   if (found && *found == token) return std::string();
   if (found && found->starts_with(token + "\n")) return found->substr(token.size() + 1);
   return Error{

@@ -26,7 +26,10 @@ Status write_token(const std::filesystem::path& file, const std::string& token,
 /// is looked at again.
 Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token,
                                      Patience* patience = nullptr);
-/// The same error, or none.
+/// Whether the token stands in `file`; false: another one does, or nothing has this name. Error,
+/// io: the file cannot be read now.
+Result<bool> has_token(const std::filesystem::path& file, const std::string& token);
+/// The same error as read_after_token's, or none.
 Status expect_token(const std::filesystem::path& file, const std::string& token,
                     Patience* patience = nullptr);
 

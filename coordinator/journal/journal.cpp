@@ -298,11 +298,12 @@ Status Journal::delete_job(const Digest& job) {
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM owners WHERE job = ?",
         "DELETE FROM frame_files WHERE job = ?", "DELETE FROM output_marks WHERE job = ?",
-        "DELETE FROM versions WHERE document = ?", "DELETE FROM renderers WHERE job = ?",
-        "DELETE FROM jobs WHERE digest = ?"})
+        "DELETE FROM marked_folders WHERE job = ?", "DELETE FROM versions WHERE document = ?",
+        "DELETE FROM renderers WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   BATON_TRY(change("DELETE FROM growth WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM locked_frames WHERE id NOT IN (SELECT id FROM versions)"));
+  BATON_TRY(change("DELETE FROM pictures_given_up WHERE id NOT IN (SELECT id FROM versions)"));
   return change("DELETE FROM identities WHERE id NOT IN (SELECT id FROM versions)");
 }
 
@@ -346,9 +347,11 @@ Status Journal::record_frame_file(const Digest& job, const FrameFile& file) {
       file.stamp.time_ns);
 }
 
-Status Journal::record_output_mark(const Digest& job, bool is_marked) {
-  return is_marked ? change("INSERT OR IGNORE INTO output_marks (job) VALUES (?)", job)
-                   : change("DELETE FROM output_marks WHERE job = ?", job);
+Status Journal::record_output_mark(const Digest& job, const std::optional<std::string>& folder) {
+  if (!folder) return change("DELETE FROM output_marks WHERE job = ?", job);
+  BATON_TRY(
+      change("INSERT OR IGNORE INTO marked_folders (folder, job) VALUES (?, ?)", *folder, job));
+  return change("INSERT OR IGNORE INTO output_marks (job) VALUES (?)", job);
 }
 
 Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks) {

@@ -127,7 +127,8 @@ class Journal {
   Status record_failure(const Failure& failure);
   Status record_renderer(const Digest& job, const std::string& renderer);
   Status record_frame_file(const Digest& job, const FrameFile& file);
-  Status record_output_mark(const Digest& job, bool is_marked);
+  /// folder: that is marked now; nullopt: the mark goes.
+  Status record_output_mark(const Digest& job, const std::optional<std::string>& folder);
   /// Forgets that these tasks were done.
   Status record_reopened(const Digest& job, const std::vector<TaskKey>& tasks);
 
@@ -144,9 +145,9 @@ class Journal {
   /// Summaries of the newest `count` jobs in the archive, the oldest first.
   Result<std::vector<Bytes>> archived_summaries(int count);
   Result<std::uint64_t> num_archived();
-  /// The jobs, in the archive or not, that write to a folder, or those of this name, in the order
-  /// of submission.
-  Result<std::vector<Digest>> jobs_in(const std::string& folder,
+  /// The jobs, in the archive or not, or those of this name, that know a folder by a name of which
+  /// is_it(name) is true, or have marked one that had it; in the order of submission.
+  Result<std::vector<Digest>> jobs_in(const std::function<bool(const std::string&)>& is_it,
                                       const std::optional<std::string>& name = {});
   /// The jobs of this name, or whose ID begins so, or the digest of a version; a few of them.
   Result<std::vector<FoundJob>> find_jobs(const std::string& text);
@@ -169,11 +170,12 @@ class Journal {
   /// Frames that count as done whatever is in their files.
   Result<std::map<JobId, std::set<FrameNumber>>> locked_frames();
   Status record_lock(const JobId& id, FrameNumber frame, bool is_locked);
-  /// Pictures in the places of frames (by normal path) that a person has given up, and that are not
-  /// replaced yet.
-  Result<std::map<std::filesystem::path, Digest>> given_up();
+  /// Pictures in the places of a job's frames, by name in its folder, that a person has given up,
+  /// and that are not replaced yet.
+  Result<std::map<std::string, Digest>> given_up(const JobId& id);
   /// nullopt: it is replaced, or nobody says so any more.
-  Status record_given_up(const std::filesystem::path& file, const std::optional<Digest>& picture);
+  Status record_given_up(const JobId& id, const std::string& file,
+                         const std::optional<Digest>& picture);
   /// An empty one: the job does not grow.
   Result<JobGrowth> growth(const JobId& id);
   /// Likewise.

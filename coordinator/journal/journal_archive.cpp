@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <map>
 #include <utility>
 
 #include "common/base/archive.h"
@@ -123,14 +124,35 @@ Result<std::uint64_t> Journal::num_archived() {
   return row ? static_cast<std::uint64_t>(query.integer(0)) : 0;
 }
 
-Result<std::vector<Digest>> Journal::jobs_in(const std::string& folder,
+Result<std::vector<Digest>> Journal::jobs_in(const std::function<bool(const std::string&)>& is_it,
                                              const std::optional<std::string>& name) {
-  BATON_ASSIGN(SqlStatement query,
-               database_.prepare(fmt::format("SELECT digest FROM jobs WHERE folder = ?1 AND {} "
-                                             "ORDER BY position",
-                                             name ? "name = ?2" : "?2 = ?2")));
-  query.bind(folder).bind(name.value_or(""));
-  return read_digests(query);
+  BATON_ASSIGN(
+      SqlStatement names,
+      database_.prepare("SELECT folder FROM jobs UNION SELECT folder FROM marked_folders"));
+  std::vector<std::string> folders;
+  while (true) {
+    BATON_ASSIGN(const bool row, names.step());
+    if (!row) break;
+    if (std::string folder = names.text(0); is_it(folder)) folders.push_back(std::move(folder));
+  }
+  std::map<std::int64_t, Digest> found;
+  for (const std::string& folder : folders) {
+    BATON_ASSIGN(SqlStatement query,
+                 database_.prepare(fmt::format(
+                     "SELECT position, digest FROM jobs WHERE (folder = ?1 OR digest IN (SELECT "
+                     "job FROM marked_folders WHERE folder = ?1)) AND {}",
+                     name ? "name = ?2" : "?2 = ?2")));
+    query.bind(folder).bind(name.value_or(""));
+    while (true) {
+      BATON_ASSIGN(const bool row, query.step());
+      if (!row) break;
+      if (const std::optional<Digest> job = Digest::from_hex(query.text(1)))
+        found[query.integer(0)] = *job;
+    }
+  }
+  std::vector<Digest> jobs;
+  for (const auto& [position, job] : found) jobs.push_back(job);
+  return jobs;
 }
 
 Result<std::vector<FoundJob>> Journal::find_jobs(const std::string& text) {

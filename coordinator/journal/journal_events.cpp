@@ -79,9 +79,11 @@ Status Journal::record_lock(const JobId& id, FrameNumber frame, bool is_locked) 
                 id.hex(), std::int64_t{frame.value()});
 }
 
-Result<std::map<std::filesystem::path, Digest>> Journal::given_up() {
-  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT file, digest FROM given_up"));
-  std::map<std::filesystem::path, Digest> given_up;
+Result<std::map<std::string, Digest>> Journal::given_up(const JobId& id) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT file, digest FROM pictures_given_up WHERE id = ?"));
+  query.bind(id.hex());
+  std::map<std::string, Digest> given_up;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return given_up;
@@ -90,11 +92,12 @@ Result<std::map<std::filesystem::path, Digest>> Journal::given_up() {
   }
 }
 
-Status Journal::record_given_up(const std::filesystem::path& file,
+Status Journal::record_given_up(const JobId& id, const std::string& file,
                                 const std::optional<Digest>& picture) {
-  const std::string name = file.lexically_normal().string();
-  if (!picture) return change("DELETE FROM given_up WHERE file = ?", name);
-  return change("INSERT OR REPLACE INTO given_up (file, digest) VALUES (?, ?)", name, *picture);
+  if (!picture)
+    return change("DELETE FROM pictures_given_up WHERE id = ? AND file = ?", id.hex(), file);
+  return change("INSERT OR REPLACE INTO pictures_given_up (id, file, digest) VALUES (?, ?, ?)",
+                id.hex(), file, *picture);
 }
 
 Result<JobGrowth> Journal::growth(const JobId& id) {

@@ -76,7 +76,8 @@ inline constexpr const char* kSchema = R"sql(
 /// Where other tables say `job`, they mean the digest of a document: a version. `versions` says of
 /// which job (JobId) it is the n-th, `identities` when what happened to that job, `locked_frames`
 /// which of its frames count as done whatever is in their files, `growth` how it has come by its
-/// sweeps. `given_up` has the pictures that jobs may replace though no job has written them.
+/// sweeps. `pictures_given_up` are those that a job may replace though no job has written them;
+/// `marked_folders` what output folders were, without links, when a job marked them.
 /// `events` is appended to alone (FarmEvent), without an index, which would cost more than it
 /// saves; its last row stays, so that no number is given twice. Of those that are old, `event_sums`
 /// keeps count and seconds.
@@ -104,7 +105,12 @@ inline constexpr const char* kLaterTables = R"sql(
     PRIMARY KEY (job, kind)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS locked_frames (
     id TEXT NOT NULL, frame INTEGER NOT NULL, PRIMARY KEY (id, frame)) WITHOUT ROWID;
-  CREATE TABLE IF NOT EXISTS given_up (file TEXT PRIMARY KEY, digest TEXT NOT NULL) WITHOUT ROWID;
+  DROP TABLE IF EXISTS given_up;
+  CREATE TABLE IF NOT EXISTS pictures_given_up (
+    id TEXT NOT NULL, file TEXT NOT NULL, digest TEXT NOT NULL,
+    PRIMARY KEY (id, file)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS marked_folders (
+    folder TEXT NOT NULL, job TEXT NOT NULL, PRIMARY KEY (folder, job)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS growth (
     id TEXT PRIMARY KEY, since_ms INTEGER NOT NULL, sweeps INTEGER NOT NULL,
     said TEXT NOT NULL) WITHOUT ROWID;

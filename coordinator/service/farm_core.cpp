@@ -11,6 +11,7 @@
 #include "common/job/text/frame_range.h"
 #include "common/store/folder_token.h"
 #include "coordinator/service/diagnostics_file.h"
+#include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
 
 namespace baton {
@@ -19,8 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// Without so many of its heartbeats a worker loses its leases.
-constexpr int kSilentHeartbeats = 4;
 /// After which a worker that got less than it requested may ask again.
 constexpr std::int32_t kRetryMs = 250;
 constexpr int kMaxFailuresShown = 100;
@@ -37,7 +36,7 @@ FarmCore::FarmCore(const ServiceOptions& with, Router messages, Journal records,
       journal(std::move(records)),
       store(std::move(blobs)),
       scheduler({.epoch = journal.epoch(),
-                 .silence_limit = kSilentHeartbeats * with.heartbeat,
+                 .silence_limit = with.silence_limit(),
                  .store_limit = with.store_limit,
                  .may_take_over = with.mixed_builds}),
       history(journal) {}
@@ -137,6 +136,16 @@ Result<std::optional<JobDetail>> FarmCore::archived_detail(const Digest& job) {
   return std::optional(std::move(detail));
 }
 
+Result<bool> FarmCore::explain_failed(const Digest& job, const std::string& reason) {
+  BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
+  if (!detail) return false;
+  const JobSummary& summary = detail->summary;
+  if (summary.status != JobStatus::failed || summary.tasks_failed > 0) return false;
+  detail->waits = reason;
+  BATON_TRY(journal.describe_archived(job, summary.status, to_bytes(summary), to_bytes(*detail)));
+  return true;
+}
+
 Status FarmCore::archive_ended() {
   for (const Digest& job : std::exchange(ended_, {})) BATON_TRY(archive_job(job));
   return {};
@@ -204,7 +213,7 @@ Status FarmCore::perform(const RecordJobStatus& action) {
   if (job != nullptr && !is_open(action.status)) {
     unmarked_[action.job] = output_token_file(job->spec.output.directory, action.job);
     marked_.erase(action.job);
-    BATON_TRY(journal.record_output_mark(action.job, false));
+    BATON_TRY(journal.record_output_mark(action.job, std::nullopt));
   }
   // Workers that have its document from before do not ask for it again.
   if (action.status == JobStatus::running && !marked_.contains(action.job))
@@ -281,7 +290,8 @@ Status FarmCore::perform(const RemoveBlobs& action) {
 Result<FolderRecord*> FarmCore::record_of(const Digest& job, const JobSpec& spec) {
   const auto known = records_.find(job);
   if (known != records_.end()) return &known->second;
-  BATON_ASSIGN(FolderRecord record, FolderRecord::read(journal, folder_of(spec), job));
+  BATON_ASSIGN(FolderRecord record,
+               FolderRecord::read(journal, spec.output.directory, job, history.jobs().of(job).id));
   return &records_.emplace(job, std::move(record)).first->second;
 }
 
@@ -306,18 +316,18 @@ Result<bool> FarmCore::may_replace(const Digest& job, const JobSpec& spec, const
 
 Status FarmCore::give_up(const Digest& job, const std::vector<FramesInDoubt::Frame>& frames) {
   records_.erase(job);
+  const JobId id = history.jobs().of(job).id;
   for (const FramesInDoubt::Frame& frame : frames)
-    BATON_TRY(journal.record_given_up(frame.file, frame.digest));
+    BATON_TRY(journal.record_given_up(id, fs::path(frame.file).filename().string(), frame.digest));
   return {};
 }
 
-Status FarmCore::take_back(const Digest& job, const JobSpec& spec,
-                           const std::vector<FrameNumber>& frames) {
-  records_.erase(job);
-  for (const FrameNumber frame : frames) {
-    const fs::path path =
-        fs::path(spec.output.directory) / frame_file_name(spec.output.pattern, frame.value());
-    BATON_TRY(journal.record_given_up(path, std::nullopt));
+Status FarmCore::take_back(const JobId& id,
+                           const std::function<bool(const std::string& file)>& which) {
+  for (const Digest& version : history.jobs().versions(id)) records_.erase(version);
+  BATON_ASSIGN(const auto given_up, journal.given_up(id));
+  for (const auto& [file, picture] : given_up) {
+    if (which(file)) BATON_TRY(journal.record_given_up(id, file, std::nullopt));
   }
   return {};
 }
@@ -348,7 +358,7 @@ Result<std::string> FarmCore::mark_output(const Digest& job) {
   if (!check_output_root(open->spec, options.roots)) return std::string();
   if (!write_token(file, token, frames)) return std::string();
   marked_.insert(job);
-  BATON_TRY(journal.record_output_mark(job, true));
+  BATON_TRY(journal.record_output_mark(job, resolve_folder(open->spec.output.directory)));
   return token;
 }
 
@@ -362,14 +372,15 @@ std::optional<std::string> FarmCore::lost_mark(const Digest& job, const JobSpec&
   if (!marked_.contains(job)) return std::nullopt;
   const fs::path folder = spec.output.directory;
   const fs::path file = output_token_file(folder, job);
-  const Result<std::optional<FileStamp>> stamp = stamp_of(file);
-  const bool may_pass = !stamp && stamp.error().kind == ErrorKind::io;
-  if (may_pass || (stamp && *stamp)) return std::nullopt;
+  const Result<bool> is_ours = has_token(file, token);
+  if (!is_ours || *is_ours) return std::nullopt;
   std::error_code error;
   if (!fs::is_directory(folder, error))
     return fmt::format("{}: the output folder is not there", folder.string());
-  return fmt::format("{}: not the output folder that the job has written to: {} is gone from it",
-                     folder.string(), file.filename().string());
+  return fmt::format(
+      "{}: not the output folder that the job has written to: {} {}", folder.string(),
+      file.filename().string(),
+      fs::exists(fs::symlink_status(file, error)) ? "in it is another's" : "is gone from it");
 }
 
 void FarmCore::remove_job_file(const Digest& job, JobStatus status) {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -23,9 +24,10 @@ namespace baton {
 
 struct ServiceOptions {
   std::string listen = "tcp://127.0.0.1:5570";
-  std::filesystem::path work_dir;  ///< holds journal.sqlite and store/
-  /// Between signs of life of a worker; without four of them it loses its leases.
-  std::chrono::milliseconds heartbeat{1000};
+  std::filesystem::path work_dir;             ///< holds journal.sqlite and store/
+  std::chrono::milliseconds heartbeat{1000};  ///< between signs of life of a worker
+  /// Without one for so long it loses its leases.
+  std::chrono::milliseconds silence_limit() const { return 4 * heartbeat; }
   /// Workers may be of other builds and instruction sets.
   bool mixed_builds = false;
   ServerAccess access = {};  ///< who is let in
@@ -114,8 +116,8 @@ class FarmCore {
                            const std::filesystem::path& path, const FileVerdict& picture);
   /// A person has said that the job may replace these.
   Status give_up(const Digest& job, const std::vector<FramesInDoubt::Frame>& frames);
-  /// It may not any more.
-  Status take_back(const Digest& job, const JobSpec& spec, const std::vector<FrameNumber>& frames);
+  /// It may not any more: files of these names.
+  Status take_back(const JobId& id, const std::function<bool(const std::string& file)>& which);
   /// Takes up the marks of a coordinator before this one.
   Status take_up_marks();
   /// The document for replays outlives its job only if that has failed.
@@ -134,6 +136,8 @@ class FarmCore {
   Result<JobDetail> living_detail(const Digest& job);
   /// Describes a job of the archive; nullopt: it is not there.
   Result<std::optional<JobDetail>> archived_detail(const Digest& job);
+  /// Replaces the reason of a job that has failed for its frames alone. Returns whether it is one.
+  Result<bool> explain_failed(const Digest& job, const std::string& reason);
 
  private:
   // Actions of the scheduler.

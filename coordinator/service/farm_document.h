@@ -1,14 +1,26 @@
 #pragma once
 
+#include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/job/text/job_json.h"
+#include "coordinator/journal/journal.h"
 
 namespace baton {
 
-/// A job document as the coordinator works with it: its output folder stands under one name,
-/// whichever the document has for it ("frames/", "./frames", a link). What of it is not there is
-/// taken as it is written. Digests are those of the document. Errors: parse_job_document's.
+/// A job document as the coordinator works with it: its output folder goes by the name that the
+/// document has for it, "frames/" without its end, and leads to where that leads today, as for the
+/// workers. Digests are those of the document. Errors: parse_job_document's.
 Result<ParsedJobDocument> parse_farm_document(std::string_view text);
+
+/// What a folder is, whichever name it goes by: its path without links, as far as it is there.
+std::string resolve_folder(const std::string& folder);
+/// The jobs of the journal, or those of this name, that write to a folder or have written to it, in
+/// the order of submission. A folder is the same if a name that it has, or had when a job marked
+/// it, leads to the same place today: it may have been moved, and a link have come in its place.
+Result<std::vector<Digest>> jobs_in_folder(Journal& journal, const std::string& folder,
+                                           const std::optional<std::string>& name = {});
 
 }  // namespace baton

@@ -15,19 +15,21 @@ namespace baton {
 namespace fs = std::filesystem;
 
 Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& folder,
-                                        const Digest& job) {
+                                        const Digest& version, const JobId& id) {
   FolderRecord record;
-  record.jobs_.push_back(job);
-  BATON_ASSIGN(record.given_up_, journal.given_up());
-  BATON_ASSIGN(const std::vector<Digest> jobs, journal.jobs_in(folder));
+  record.jobs_.push_back(version);
+  BATON_ASSIGN(const auto given_up, journal.given_up(id));
+  for (const auto& [file, picture] : given_up) record.given_up_[fs::path(folder) / file] = picture;
+  BATON_ASSIGN(const std::vector<Digest> jobs, jobs_in_folder(journal, folder));
   for (const Digest& other : jobs) {
     BATON_ASSIGN(const std::optional<std::string> text, journal.document(other));
-    const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+    Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
     if (!document) continue;
+    document->job.output.directory = folder;
     record.jobs_.push_back(other);
     BATON_TRY(journal.for_each_completion(other, [&](const Completion& done) -> Status {
       if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
-      const fs::path path = frame_path(document->job, done.task.frame()).lexically_normal();
+      const fs::path path = frame_path(document->job, done.task.frame());
       record.images_[path].push_back({other, done.made.outputs.front()});
       return {};
     }));
@@ -37,16 +39,16 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& fol
 
 std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
   std::vector<BlobRef> recorded;
-  const auto found = images_.find(path.lexically_normal());
+  const auto found = images_.find(path);
   if (found == images_.end()) return recorded;
   for (const Image& image : found->second) recorded.push_back(image.image);
   return recorded;
 }
 
 bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture) const {
-  const auto given_up = given_up_.find(path.lexically_normal());
+  const auto given_up = given_up_.find(path);
   if (given_up != given_up_.end() && given_up->second == picture.digest) return true;
-  const auto found = images_.find(path.lexically_normal());
+  const auto found = images_.find(path);
   const std::span<const Image> images =
       found == images_.end() ? std::span<const Image>() : std::span(found->second);
   if (std::ranges::any_of(images,
@@ -60,7 +62,7 @@ bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture)
 
 std::vector<Digest> FolderRecord::replaceable(const fs::path& path) const {
   std::vector<Digest> digests;
-  if (const auto given_up = given_up_.find(path.lexically_normal()); given_up != given_up_.end())
+  if (const auto given_up = given_up_.find(path); given_up != given_up_.end())
     digests.push_back(given_up->second);
   const std::vector<BlobRef> images = images_of(path);
   for (auto image = images.rbegin(); image != images.rend() && digests.size() < kMostTold;
@@ -71,7 +73,7 @@ std::vector<Digest> FolderRecord::replaceable(const fs::path& path) const {
 }
 
 void FolderRecord::give_up(const fs::path& path, const Digest& picture) {
-  given_up_[path.lexically_normal()] = picture;
+  given_up_[path] = picture;
 }
 
 OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& spec,
@@ -80,7 +82,7 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
   BlobRef nothing;
   nothing.kind = BlobKind::image;
   for (FrameIndex frame; frame.index() < spec.frames.size(); ++frame) {
-    const fs::path path = frame_path(spec, frame).lexically_normal();
+    const fs::path path = frame_path(spec, frame);
     const FrameNumber number = spec.frames[frame.index()];
     if (locked.contains(frame)) {
       const FileVerdict verdict = judge_locked(path);

@@ -14,11 +14,14 @@
 
 namespace baton {
 
-/// What the journal has of the frames in a folder, by whichever of its jobs.
+/// What the journal has of the frames in a job's folder, by whichever job wrote them there. Paths
+/// are those of the job (frame_path()).
 class FolderRecord {
  public:
-  /// folder: folder_of() `job`, the digest of a document that the journal may not have yet.
-  static Result<FolderRecord> read(Journal& journal, const std::string& folder, const Digest& job);
+  /// version: the digest of the job's document, which the journal may not have yet. id: whose
+  /// pictures that were given up are meant; empty: nobody's.
+  static Result<FolderRecord> read(Journal& journal, const std::string& folder,
+                                   const Digest& version, const JobId& id);
 
   /// What the file of a frame may be, as far as it is recorded.
   std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
@@ -35,8 +38,8 @@ class FolderRecord {
     BlobRef image;
   };
   static constexpr std::size_t kMostTold = 256;
-  std::map<std::filesystem::path, std::vector<Image>> images_;  ///< by normal path
-  std::map<std::filesystem::path, Digest> given_up_;            ///< likewise
+  std::map<std::filesystem::path, std::vector<Image>> images_;
+  std::map<std::filesystem::path, Digest> given_up_;
   std::vector<Digest> jobs_;
 };
 

@@ -16,7 +16,7 @@ template <class Visit>
 void for_each_finished_frame(const Scheduler::Job& job, Visit visit) {
   for (TaskIndex frame = 0; frame < job.tasks.graph().num_frames(); ++frame) {
     if (job.tasks.book().status(frame) == TaskStatus::done)
-      visit(frame, frame_path(job.spec, FrameIndex(frame)).lexically_normal(),
+      visit(frame, frame_path(job.spec, FrameIndex(frame)),
             job.tasks.made().outputs(frame).front());
   }
 }
@@ -41,7 +41,8 @@ std::vector<FileToRead> files_to_inspect(const Scheduler::Job& job, const FileTa
 
 Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
                                        const std::vector<FileContent>& contents,
-                                       const LockedFrames& locked, Journal& journal) {
+                                       const LockedFrames& locked, Journal& journal,
+                                       const JobId& id) {
   std::map<fs::path, const FileContent*> read;
   for (const FileContent& content : contents) read[content.path] = &content;
 
@@ -79,7 +80,8 @@ Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
   if (pictures.empty()) return found;
 
   // A worker of a former job may have written late.
-  BATON_ASSIGN(const FolderRecord record, FolderRecord::read(journal, folder_of(job.spec), {}));
+  BATON_ASSIGN(const FolderRecord record,
+               FolderRecord::read(journal, job.spec.output.directory, {}, id));
   for (const auto& [path, picture] : pictures) {
     if (record.may_replace(path, picture.second)) {
       lose(picture.first, path);

@@ -32,10 +32,6 @@ std::string describe(const Scheduler::Job& job, const Failure& failure) {
 
 }  // namespace
 
-std::string folder_of(const JobSpec& job) {
-  return fs::path(job.output.directory).lexically_normal().string();
-}
-
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
   const JobProgress progress = job.tasks.progress();
   JobSummary summary;

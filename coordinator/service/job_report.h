@@ -13,8 +13,6 @@
 
 namespace baton {
 
-/// The output folder of a job (farm_document.h), as jobs of one folder have it in common.
-std::string folder_of(const JobSpec& job);
 /// What people are told of a job.
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job);
 /// Describes a job that the scheduler knows. `failures`: the newest last.

@@ -130,6 +130,11 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   }
   if (const std::optional<std::string> difference = other_build(hello)) {
     if (!farm_.options.mixed_builds) {
+      if (may_be_alone_soon(hello)) {
+        tell("not let in now: " + *difference);
+        return farm_.refuse(
+            peer, {ErrorKind::timeout, *difference + "; asked again, since that one may be gone"});
+      }
       tell("refused: " + *difference);
       return farm_.refuse(
           peer, {ErrorKind::version,
@@ -156,6 +161,18 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
       FarmEventKind::worker_joined, hello.worker_id,
       fmt::format("{} threads on {}, {}", hello.num_threads, hello.host, hello.renderer)));
   return farm_.step(WorkerJoined{hello.worker_id, hello.running, renderer_of(hello)});
+}
+
+/// Whether those that are connected may yet turn out to be silent: not once they have shown
+/// themselves for longer than that takes since this process first asked.
+bool Service::may_be_alone_soon(const WorkerHello& hello) {
+  if (hello.build != build_identity()) return false;
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (unlike_.size() >= limits::kMaxWorkers) unlike_.clear();
+  const TimePoint since = unlike_.try_emplace(hello.instance, now).first->second;
+  if (now - since <= farm_.options.silence_limit()) return true;
+  unlike_.erase(hello.instance);
+  return false;
 }
 
 /// Says where pixels of the worker may differ from those of the others; nullopt: nowhere.

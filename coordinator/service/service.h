@@ -51,6 +51,7 @@ class Service {
   // Messages of workers.
   Status receive(const PeerId& peer, const WorkerHello& message);
   std::optional<std::string> other_build(const WorkerHello& hello) const;
+  bool may_be_alone_soon(const WorkerHello& hello);
   Status receive_from(const std::string& worker, const LeaseRequest& message);
   Status receive_from(const std::string& worker, const Heartbeat& message);
   Status receive_from(const std::string& worker, const TaskDone& message);
@@ -93,7 +94,7 @@ class Service {
   bool await_inputs(const std::string& worker, const TaskFailed& message);
   bool await_outputs(const TaskDone& message);
   Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
-                                                const Digest& job, const JobSpec& spec,
+                                                const JobVersion& version, const JobSpec& spec,
                                                 const LockedFrames& locked);
 
   // Frames and their folder, while a job runs and at its end (service_frames.cpp).
@@ -109,6 +110,8 @@ class Service {
   std::unique_ptr<FarmCore> owned_farm_;
   FarmCore& farm_;
   OncePerPeer complained_, asked_for_hello_;
+  /// When instances of workers that render otherwise than the others first asked to be let in.
+  std::map<std::uint64_t, TimePoint> unlike_;
   Speaker speaker_;                        ///< who sent the message in hand
   std::map<std::string, TimePoint> told_;  ///< warnings, and when
   TimePoint next_tick_{};

@@ -43,7 +43,8 @@ Status Service::keep_frame_file(const TaskDone& report, const ReportedFrame& fra
   if (!task || job->tasks.made().outputs(*task) != report.made.outputs) return {};
   const FileStamp stamp = frame.stamp.value().value();
   files_.add({frame.path, stamp, frame.digest, {}, report.lease.job.hex()});
-  BATON_TRY(farm_.journal.record_given_up(frame.path, std::nullopt));
+  BATON_TRY(farm_.journal.record_given_up(farm_.history.jobs().of(report.lease.job).id,
+                                          frame.path.filename().string(), std::nullopt));
   return farm_.journal.record_frame_file(report.lease.job,
                                          {report.lease.task.frame(), frame.digest, stamp});
 }
@@ -91,7 +92,8 @@ Status Service::end_inspection(const FilesRead& read) {
   const Scheduler::Job* const job = farm_.scheduler.find_job(digest);
   if (job == nullptr || job->status != JobStatus::running) return {};
   BATON_ASSIGN(const InspectedFrames found,
-               inspect_frames(*job, read.contents, farm_.locked(digest, job->spec), farm_.journal));
+               inspect_frames(*job, read.contents, farm_.locked(digest, job->spec), farm_.journal,
+                              farm_.history.jobs().of(digest).id));
   // What changes while it is read, or cannot be read now, may stand otherwise in a moment.
   if (found.is_stale || (!found.unreadable.empty() && may_pass(digest))) {
     farm_.to_inspect.emplace(digest, std::chrono::steady_clock::now() + kInspectAgain);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -170,14 +171,12 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   // Jobs that ended in this turn of the loop are read from the archive, too.
   BATON_TRY(farm_.archive_ended());
   // A job that cannot be run is refused before it leaves a trace.
-  const Result<ParsedJobDocument> as_written = parse_job_document(message.json);
-  if (!as_written) return farm_.refuse(peer, as_written.error());
-  if (const Status within = check_roots(*as_written, farm_.options.roots); !within) {
-    spdlog::warn("refused: job '{}': {}", as_written->job.name, within.error().message);
-    return farm_.refuse(peer, within.error());
-  }
   Result<ParsedJobDocument> document = parse_farm_document(message.json);
   if (!document) return farm_.refuse(peer, document.error());
+  if (const Status within = check_roots(*document, farm_.options.roots); !within) {
+    spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
+    return farm_.refuse(peer, within.error());
+  }
   Submission submission(farm_, files_, speaker_);
   SubmitJob wanted = message;
   BATON_ASSIGN(wanted.json,
@@ -196,7 +195,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   BATON_ASSIGN(const JobId id, submission.known_job(*document));
   const LockedFrames locked(document->job, farm_.history.jobs().locked(id));
   BATON_ASSIGN(const std::optional<OddFrames> odd,
-               await_frames(peer, message, document->digest, document->job, locked));
+               await_frames(peer, message, {document->digest, id}, document->job, locked));
   if (!odd) return {};
   const Scheduler::Job* const known = farm_.scheduler.find_job(document->digest);
   const bool runs = known != nullptr && known->status == JobStatus::running;
@@ -205,6 +204,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   if (!odd->unreadable.empty() && !may_replace && !runs && may_pass(document->digest))
     return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + odd->unreadable});
   pass(document->digest);
+  if (!fault.empty() && peer.empty()) BATON_TRY(farm_.explain_failed(document->digest, fault));
   if (!fault.empty() && !may_replace && !runs)
     return farm_.refuse(peer,
                         {ErrorKind::io, fmt::format("job '{}': {}", document->job.name, fault)});
@@ -214,12 +214,15 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
 /// The frames that a message about a job would replace or keep. nullopt: some must be read, and the
 /// message waits.
 Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const Message& message,
-                                                       const Digest& job, const JobSpec& spec,
+                                                       const JobVersion& version,
+                                                       const JobSpec& spec,
                                                        const LockedFrames& locked) {
   const TimePoint now = std::chrono::steady_clock::now();
   const Incoming incoming{peer, message, speaker_};
+  const Digest& job = version.document;
   if (waits_->join(job, incoming, now)) return std::optional<OddFrames>();
-  BATON_ASSIGN(const FolderRecord record, FolderRecord::read(farm_.journal, folder_of(spec), job));
+  BATON_ASSIGN(const FolderRecord record,
+               FolderRecord::read(farm_.journal, spec.output.directory, job, version.id));
   OddFrames odd = find_odd_frames(record, files_, spec, locked);
   if (odd.unread.empty()) return std::optional(std::move(odd));
   const std::string text = fmt::format("job '{}': looking at {} frames in {}", spec.name,
@@ -314,12 +317,8 @@ Status Service::receive(const PeerId& peer, const ShowJob& message) {
 
 Status Service::receive(const PeerId& peer, const CancelJob& message) {
   if (const Result<Digest> job = resolve_own(message.job)) {
-    const JobId id = farm_.history.jobs().of(*job).id;
-    for (const Digest& version : farm_.history.jobs().versions(id)) {
-      BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(version));
-      const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
-      if (document) BATON_TRY(farm_.take_back(version, document->job, document->job.frames));
-    }
+    BATON_TRY(
+        farm_.take_back(farm_.history.jobs().of(*job).id, [](const std::string&) { return true; }));
   }
   return change_job<JobCancelled>(peer, message.job);
 }
@@ -335,7 +334,8 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
   const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
   if (known != nullptr && known->status == JobStatus::paused) {
     BATON_ASSIGN(const std::optional<OddFrames> odd,
-                 await_frames(peer, message, *job, known->spec, farm_.locked(*job, known->spec)));
+                 await_frames(peer, message, {*job, farm_.history.jobs().of(*job).id}, known->spec,
+                              farm_.locked(*job, known->spec)));
     if (!odd) return {};
     BATON_ASSIGN(LostFiles lost, Submission(farm_, files_, speaker_).lost_files_of(*job));
     if (lost.unreadable && may_pass(*job))
@@ -376,11 +376,19 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
     places = std::move(found).value();
   }
   BATON_TRY(farm_.history.locked(*job, frames, !message.off));
-  BATON_TRY(farm_.take_back(*job, document->job, frames));
+  std::set<std::string> files;
+  for (const FrameNumber frame : frames)
+    files.insert(frame_file_name(document->job.output.pattern, frame.value()));
+  BATON_TRY(farm_.take_back(farm_.history.jobs().of(*job).id,
+                            [&](const std::string& file) { return files.contains(file); }));
   spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
   if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
+  // A job that has failed for its frames alone ends as they stand now.
+  BATON_ASSIGN(const bool may_be_done,
+               message.off ? Result<bool>(false) : farm_.explain_failed(*job, {}));
+  if (may_be_done) BATON_TRY(receive(PeerId(), SubmitJob{*text, false}));
   return answer_detail(peer, *job);
 }
 

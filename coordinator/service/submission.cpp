@@ -20,16 +20,27 @@
 
 namespace baton {
 
-namespace fs = std::filesystem;
+namespace {
+
+/// What --restart cannot decide while nobody is connected; empty: it has decided.
+std::string undecided_text(const Scheduler& scheduler, const Digest& job) {
+  const std::string& renderer = scheduler.find_job(job)->renderer;
+  if (renderer.empty() || !scheduler.leases().connected().empty()) return {};
+  return fmt::format(
+      "no worker is connected: for those that do not render with {} --restart is needed once more",
+      renderer);
+}
+
+}  // namespace
 
 // ---- another job of the folder ------------------------------------------------------------------
 
 /// What the journal knows of the jobs of a folder that can be read, in the order of submission, as
-/// far as a later one can use it.
+/// far as a later one can use it. They write into it by that name, whichever they have for it.
 Result<std::vector<Submission::InFolder>*> Submission::jobs_in(const std::string& folder) {
   const auto [entry, is_new] = folders_.try_emplace(folder);
   if (!is_new) return &entry->second;
-  BATON_ASSIGN(const std::vector<Digest> jobs, farm_.journal.jobs_in(folder));
+  BATON_ASSIGN(const std::vector<Digest> jobs, jobs_in_folder(farm_.journal, folder));
   for (const Digest& job : jobs) {
     BATON_ASSIGN(JournalledJob known, farm_.journal.load(job));
     Result<ParsedJobDocument> document = parse_farm_document(known.document);
@@ -41,6 +52,7 @@ Result<std::vector<Submission::InFolder>*> Submission::jobs_in(const std::string
                      std::move(known.completions.frames),
                      std::move(known.renderer)};
     former.document.job.leading_runs = former.plan.leading_runs;
+    former.document.job.output.directory = folder;
     entry->second.push_back({job, std::move(former)});
   }
   return &entry->second;
@@ -52,7 +64,7 @@ Result<JobId> Submission::known_job(const ParsedJobDocument& document) {
   const IdentityBook& known = farm_.history.jobs();
   if (const JobId before = known.of(document.digest).id; !before.empty()) return before;
   BATON_ASSIGN(const std::vector<Digest> namesakes,
-               farm_.journal.jobs_in(folder_of(document.job), document.job.name));
+               jobs_in_folder(farm_.journal, document.job.output.directory, document.job.name));
   const auto same =
       std::ranges::find_if(namesakes.rbegin(), namesakes.rend(), [&](const Digest& v) {
         return farm_.owner_of(v) == speaker_.name && !known.of(v).id.empty();
@@ -66,7 +78,7 @@ Result<JobId> Submission::known_job(const ParsedJobDocument& document) {
 Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocument& document,
                                                            const JobId& job, bool restart) {
   std::vector<Neighbour> others;
-  BATON_ASSIGN(const auto* neighbours, jobs_in(folder_of(document.job)));
+  BATON_ASSIGN(const auto* neighbours, jobs_in(document.job.output.directory));
   for (const auto& [digest, former] : *neighbours) {
     if (digest == document.digest) continue;
     BATON_ASSIGN(const std::optional<JobDetail> ended, farm_.archived_detail(digest));
@@ -180,8 +192,12 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return others.error();
     return farm_.refuse(peer, others.error());
   }
-  if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
   BATON_TRY(farm_.history.submitted(document.digest, id, message.restart ? "restart" : ""));
+  if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
+  std::set<std::string> files;
+  for (const FrameNumber frame : document.job.frames)
+    files.insert(frame_file_name(document.job.output.pattern, frame.value()));
+  BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return !files.contains(file); }));
   BATON_TRY(begin_growth(document, message.restart));
   BATON_ASSIGN(std::vector<std::string> reasons, make_way(document, *others));
   return begin(peer, document, message, std::move(reasons));
@@ -211,6 +227,8 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
   // The answer goes out before any lease of the job.
   const std::size_t place = farm_.num_replies();
   BATON_TRY(farm_.step(event));
+  if (std::string line = undecided_text(farm_.scheduler, digest); message.restart && !line.empty())
+    reasons.push_back(std::move(line));
   const Scheduler::Job& job = *farm_.scheduler.find_job(digest);
   const TaskCounts& tasks = job.tasks.book().counts();
   const bool has_all = is_right && tasks.open == 0 && tasks.failed == 0;
@@ -246,7 +264,7 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
                                                        bool restart, const LockedFrames& locked,
                                                        std::vector<std::string>& reasons) {
   Heritage heritage;
-  BATON_ASSIGN(const auto* neighbours, jobs_in(folder_of(document.job)));
+  BATON_ASSIGN(const auto* neighbours, jobs_in(document.job.output.directory));
   std::vector<FormerJob> formers;
   // Where frames of a job are by one renderer, that of the newest which has frames decides.
   std::string newest;
@@ -334,7 +352,8 @@ Status Submission::take_over(const Heritage& heritage, const std::string& text, 
   if (text.empty()) {
     BATON_TRY(farm_.journal.restart_job(event.job));
   } else {
-    BATON_TRY(farm_.journal.add_job(event.job, text, {event.spec.name, folder_of(event.spec)}));
+    BATON_TRY(
+        farm_.journal.add_job(event.job, text, {event.spec.name, event.spec.output.directory}));
   }
   BATON_TRY(farm_.journal.record_plan(event.job, adoption.plan));
   event.renderer = heritage.renderer;
@@ -370,6 +389,8 @@ Status Submission::go_on(const PeerId& peer, const Digest& digest, bool restart)
   const JobSpec& spec = farm_.scheduler.find_job(digest)->spec;
   if (std::string kept = locked_text(spec, farm_.locked(digest, spec)); restart && !kept.empty())
     reasons.push_back(std::move(kept));
+  if (std::string line = undecided_text(farm_.scheduler, digest); restart && !line.empty())
+    reasons.push_back(std::move(line));
   const std::size_t place = farm_.num_replies();
   if (runs && !lost.tasks.empty()) BATON_TRY(farm_.step(JobPaused{digest}));
   if (!runs || !lost.tasks.empty())

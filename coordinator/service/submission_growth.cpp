@@ -18,7 +18,7 @@ namespace baton {
 Result<Submission::WrittenSweeps> Submission::written_sweeps(const ParsedJobDocument& document) {
   std::map<FrameNumber, int> of_frames;
   for (const FrameNumber frame : document.job.frames) of_frames[frame] = 0;
-  BATON_ASSIGN(const auto* neighbours, jobs_in(folder_of(document.job)));
+  BATON_ASSIGN(const auto* neighbours, jobs_in(document.job.output.directory));
   for (const auto& [digest, former] : *neighbours) {
     if (former.document.picture != document.picture) continue;
     const JobSpec& job = former.document.job;

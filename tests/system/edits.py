@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Sequences of edits of jobs, each submitted while the one before is at work: names of files, frames both ways, AOVs, sweeps,
-tiles. Waiters are killed, the last version is left alone, and every frame of it must be there and right; no attempt may fail.
+tiles; now and then with --restart. All workers give way to others, which render with another instruction set, and back. Waiters
+are killed, the last version is left alone, and every frame of it must be there and right, all of them by one instruction set; no
+attempt may fail.
 
 usage: edits.py --bin FOLDER [--sequences N] [--seed S] [--keep]
 """
@@ -16,11 +18,41 @@ import tempfile
 import time
 from pathlib import Path
 
-from chaos_jobs import KINDS, Job, Undisturbed, edits_of
+from chaos_jobs import FOREIGN_ISA, KINDS, Job, Undisturbed, edits_of
 from farm import OK, PATIENCE, Farm, Fault, Programs, check, wait_until
 
 EDITS, END_S = 5, 120 * PATIENCE
 AT_ONCE = 4  # sequences on one farm
+ISAS = ("auto", FOREIGN_ISA)
+SWITCH_S = (0.5, 4)  # from one kind of workers to the other
+NUM_WORKERS = 2
+
+
+class Workers:
+    """All of one instruction set, then all of the other."""
+
+    def __init__(self, farm, seed):
+        self.farm, self.rng, self.isa, self.num_switches, self.num_started = farm, random.Random(f"{seed} workers"), ISAS[0], 0, 0
+        self.workers = []
+        self.start()
+
+    def start(self):
+        for _ in range(NUM_WORKERS):
+            self.num_started += 1
+            self.workers.append(self.farm.start_worker(name=f"{self.isa}-{self.num_started}", extra=("--isa", self.isa)))
+        self.next_at = time.monotonic() + self.rng.uniform(*SWITCH_S)
+
+    def tend(self):
+        if time.monotonic() < self.next_at:
+            return
+        for worker in self.workers:
+            worker.kill() if self.rng.random() < 0.2 else worker.terminate()
+        for worker in self.workers:
+            worker.wait()
+        self.workers.clear()
+        self.isa = ISAS[1] if self.isa == ISAS[0] else ISAS[0]
+        self.num_switches += 1
+        self.start()
 
 
 class Sequence:
@@ -32,8 +64,8 @@ class Sequence:
         self.next_at = 0
         self.left = EDITS
 
-    def submit(self):
-        answer = self.farm.baton("job", "submit", self.job.path, "--json", expect=None)
+    def submit(self, *options):
+        answer = self.farm.baton("job", "submit", self.job.path, "--json", *options, expect=None)
         check(answer.returncode == OK, f"{self}: {answer.stderr}")
         ident = json.loads(answer.stdout)["id"]
         check(self.job.id in (None, ident), f"{self}: another ID, {ident} after {self.job.id}")
@@ -48,8 +80,9 @@ class Sequence:
         elif self.left > 0:
             what, settings = self.rng.choice(edits_of(self.job, self.rng))
             self.job.edit(**settings)
-            self.diary.append(f"{what} {json.dumps(settings)}")
-            self.submit()
+            options = ["--restart"] if self.rng.random() < 0.3 else []
+            self.diary.append(f"{what} {json.dumps(settings)}{' --restart' if options else ''}")
+            self.submit(*options)
             self.left -= 1
         else:
             shown = self.farm.show(self.job.id)
@@ -72,15 +105,17 @@ class Sequence:
 def run(programs, folder, num_sequences, seed):
     """Everything. Raises Fault."""
     folder.mkdir(parents=True, exist_ok=True)
-    expected = Undisturbed(programs, folder / "plain")
+    expected = Undisturbed(programs, folder / "plain", isas=ISAS)
     num_edits = 0
     with contextlib.ExitStack() as stack:
-        farm = stack.enter_context(Farm(programs, folder / "farm", workers=2))
+        farm = stack.enter_context(Farm(programs, folder / "farm", workers=0))
+        workers = Workers(farm, seed)
         for first in range(0, num_sequences, AT_ONCE):
             sequences = [Sequence(farm, number, f"{seed} {number}") for number in range(first, min(first + AT_ONCE, num_sequences))]
             waiting = list(sequences)
 
             def all_done():
+                workers.tend()
                 waiting[:] = [sequence for sequence in waiting if not sequence.tend()]
                 return not waiting
             wait_until(all_done, f"sequences {first} on are done: {', '.join(map(str, sequences))}", END_S)
@@ -95,7 +130,8 @@ def run(programs, folder, num_sequences, seed):
         check("BUG" not in log, "the coordinator has found a bug")
         failed = [line for line in log.splitlines() if ": attempt " in line and " failed: " in line]
         check(not failed, f"{len(failed)} attempts have failed: {failed[:1]}")
-    print(f"seed {seed}: {num_sequences} sequences, {num_edits} edits; all frames right")
+    print(f"seed {seed}: {num_sequences} sequences, {num_edits} edits, {workers.num_switches} times other workers; all frames "
+          "right")
 
 
 def main():

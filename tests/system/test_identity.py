@@ -187,6 +187,41 @@ def a_folder_has_one_name(programs, folder):
         check(files(place)[1] != before[1], "the other frame is of another picture")
 
 
+def a_folder_that_was_moved_is_the_same(programs, folder):
+    """A link stands in its place, from the first or later: job, frames and locks stay, for whoever names the new place, too."""
+    for how in ("a link later", "a link from the first"):
+        place = folder / how.replace(" ", "-")
+        place.mkdir(parents=True)
+        if how == "a link from the first":
+            (place / "disk1").mkdir()
+            (place / FOLDER).symlink_to(place / "disk1")
+        painted = None
+        with Farm(programs, place / "farm", workers=1) as farm:
+            def submit(frames, *extra, expect=OK, **changes):
+                job = small_job(place, frames)
+                job["output"]["directory"] = changes.pop("output", job["output"]["directory"])
+                return farm.baton("job", "submit", write_job(place / "job.json", {**job, **changes}), "--json", *extra, expect=expect)
+
+            ident = json.loads(submit("1-3").stdout)["id"]
+            farm.wait_for(ident)
+            before = files(place)
+            (place / FOLDER / "frame.0003.exr").write_bytes(painted := before[1])
+            farm.baton("job", "lock", ident, "--frames", "3")
+            moved = place / FOLDER if how == "a link later" else place / "disk1"
+            moved.rename(place / "disk2")
+            (place / FOLDER).unlink(missing_ok=True)
+            (place / FOLDER).symlink_to(place / "disk2")
+
+            check_says(submit("1-5").stdout, ident, "frames 1-3 are kept")
+            farm.wait_for(ident)
+            check_says(submit("1-3", "--restart", name="another", seed=9, output=str(place / "disk2"), expect=BAD_INPUT).stderr,
+                       "are locked in job")
+            submit("1-5", "--restart", seed=9)
+            farm.wait_for(ident)
+            check_equal((place / "disk2/frame.0003.exr").read_bytes(), painted, "the locked frame")
+            check(files(place)[1] != before[1], "the other frames are of another picture")
+
+
 def a_deleted_job_may_come_again(programs, folder):
     """Its frames are those of its own document; its history can be asked for by its ID."""
     with Farm(programs, folder / "farm") as farm:

@@ -84,6 +84,20 @@ def who_can_go_on_is_let_in(programs, folder):
     check_equal(len(makers), 1, f"renderers of the frames, {makers}")
 
 
+def who_comes_before_a_dead_one_is_missed_is_let_in(programs, folder):
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_worker(extra=("--isa", sets[-1]))
+        wait_until(lambda: "joined" in farm.coordinator.log(), "it is there")
+        farm.workers[0].kill()
+        other = farm.start_worker(extra=("--isa", sets[0]))
+        ident = farm.submit(make(folder))
+        farm.wait_for(ident)
+        check(other.alive(), "it was let in")
+
+
 def what_is_kept_is_by_one(programs, folder):
     """Versions of a job by two instruction sets: the next one goes on from the newest that has frames, with its set."""
     sets = sets_of(programs)

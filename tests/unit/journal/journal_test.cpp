@@ -277,7 +277,7 @@ TEST_F(JournalTest, TablesThatCameLaterAreMadeWhenTheyAreMissing) {
     EXPECT_TRUE(journal.frame_files(kJob).value().empty());
     ASSERT_TRUE(journal.record_frame_file(kJob, {FrameIndex(3), digest_of("old"), {}}).ok());
     ASSERT_TRUE(journal.record_frame_file(kJob, file).ok());
-    ASSERT_TRUE(journal.record_output_mark(kJob, true).ok());
+    ASSERT_TRUE(journal.record_output_mark(kJob, "/frames").ok());
     ASSERT_TRUE(journal.commit().ok());
   }
   Journal journal = open();
