@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -21,11 +22,13 @@ Result<std::optional<FileStamp>> stamp_of(const std::filesystem::path& path) {
                  fmt::format("{}: is {}, expected a file", path.string(),
                              S_ISDIR(status.st_mode) ? "a folder" : "no plain file")};
   }
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+  const auto ns_of = [](const timespec& time) {
+    return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+  };
   return std::optional(
       FileStamp{.size_bytes = static_cast<std::uint64_t>(status.st_size),
                 .inode = status.st_ino,
-                .time_ns = status.st_mtim.tv_sec * kNsPerSecond + status.st_mtim.tv_nsec});
+                .time_ns = std::max(ns_of(status.st_mtim), ns_of(status.st_ctim))});
 }
 
 }  // namespace baton

@@ -11,7 +11,8 @@ namespace baton {
 /// How a file stands in its folder; one that was written again differs in some of it.
 struct FileStamp {
   std::uint64_t size_bytes = 0, inode = 0;
-  std::int64_t time_ns = 0;  ///< of the last change of the bytes
+  /// Of the last change of the bytes, or of how the file is kept: the former alone can be set back.
+  std::int64_t time_ns = 0;
 
   bool operator==(const FileStamp&) const = default;
 };

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <stdio.h>  // renameat2
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -153,6 +154,26 @@ class NewFile {
     is_published_ = true;
     return {};
   }
+  /// Unless something has that name, seen from here or not. False: something has.
+  Result<bool> publish_if_free() {
+    if (!file_.close()) return io_error("cannot write", path());
+    const int folder = folder_.number();
+    const std::string name = path_.filename();
+    int failed = ::renameat2(folder, name_.c_str(), folder, name.c_str(), RENAME_NOREPLACE);
+    if (failed != 0 && (errno == EINVAL || errno == ENOSYS)) {  // such as NFS
+      failed = ::linkat(folder, name_.c_str(), folder, name.c_str(), 0);
+      if (failed == 0) ::unlinkat(folder, name_.c_str(), 0);
+    }
+    if (failed != 0 && errno == EEXIST) return false;
+    // A disk that has neither can only replace.
+    if (failed != 0 && (errno == EPERM || errno == EOPNOTSUPP || errno == ENOSYS)) {
+      BATON_TRY(publish());
+      return true;
+    }
+    if (failed != 0) return io_error("cannot rename to", path_);
+    is_published_ = true;
+    return true;
+  }
   /// After publish(): its name survives a power cut.
   Status sync_name() const {
     return ::fsync(folder_.number()) == 0 ? Status() : io_error("cannot sync the folder of", path_);
@@ -197,15 +218,22 @@ Status expect_content(const fs::path& path, ByteView bytes) {
                            std::to_integer<int>(*differs.second))};
 }
 
-Status write_file_verified(const fs::path& path, ByteView bytes,
-                           const std::function<Status(const fs::path& temporary)>& check) {
+Result<bool> write_file_verified(
+    const fs::path& path, ByteView bytes,
+    const std::function<Result<bool>(const fs::path& temporary)>& may_replace) {
   BATON_ASSIGN(NewFile file, NewFile::create(path));
   BATON_TRY(file.write(bytes));
   BATON_TRY(file.sync());
   BATON_TRY(expect_content(file.path(), bytes));
-  BATON_TRY(check(file.path()));
-  BATON_TRY(file.publish());
-  return file.sync_name();
+  BATON_ASSIGN(const bool replaces, may_replace(file.path()));
+  if (replaces) {
+    BATON_TRY(file.publish());
+  } else {
+    BATON_ASSIGN(const bool is_published, file.publish_if_free());
+    if (!is_published) return false;
+  }
+  BATON_TRY(file.sync_name());
+  return true;
 }
 
 Status write_file_unsynced(const fs::path& path, ByteView bytes) {

@@ -28,12 +28,15 @@ Result<std::string> read_text_file(const std::filesystem::path& path, std::uint6
 Status write_file_atomic(const std::filesystem::path& path, ByteView bytes);
 
 /// Publishes a file that nobody reads again before it counts: the temporary file, once it is on
-/// disk, is handed to `check`, read back and compared with `bytes` byte by byte; only then it gets
-/// its name. Errors: that of `check`; ErrorKind::corrupt names the first byte that differs. Nothing
-/// is left behind on failure.
-Status write_file_verified(
+/// disk, is read back and compared with `bytes` byte by byte and handed to `may_replace`, which
+/// says whether what has the name now may go; only then it gets its name. Returns whether it did:
+/// false where nothing may go and something has the name, seen from this machine or not (a disk
+/// that cannot tell, without hard links and RENAME_NOREPLACE, replaces it). Errors: that of
+/// `may_replace`; ErrorKind::corrupt names the first byte that differs. Nothing is left behind on
+/// failure.
+Result<bool> write_file_verified(
     const std::filesystem::path& path, ByteView bytes,
-    const std::function<Status(const std::filesystem::path& temporary)>& check);
+    const std::function<Result<bool>(const std::filesystem::path& temporary)>& may_replace);
 
 /// ErrorKind::corrupt unless the file has exactly `bytes`.
 Status expect_content(const std::filesystem::path& path, ByteView bytes);

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -80,14 +81,9 @@ bool is_fair_box(std::istream& file) {
   return file && fits(edges[0], edges[2]) && fits(edges[1], edges[3]);
 }
 
-}  // namespace
-
 /// A header is attributes up to an empty name: name, type, both ended by a zero, a size and so many
 /// bytes. A file of several parts has several headers, and an empty one behind them.
-Status check_exr_attributes(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::uint64_t file_bytes = std::filesystem::file_size(path, error);
-  std::ifstream file(path, std::ios::binary);
+Status check_attributes(std::istream& file, std::uint64_t file_bytes, const std::string& path) {
   read_u32(file);  // the magic number is for OpenEXR to check
   const bool multi_part = (read_u32(file) & kMultiPart) != 0;
   std::string name, type;
@@ -99,18 +95,32 @@ Status check_exr_attributes(const std::filesystem::path& path) {
       const std::uint32_t size = read_u32(file);
       if (name == "dataWindow" && !is_fair_box(file)) {
         return Error{ErrorKind::bad_input,
-                     fmt::format("{}: dataWindow: expected sides of 1 to {} pixels", path.string(),
+                     fmt::format("{}: dataWindow: expected sides of 1 to {} pixels", path,
                                  limits::kMaxImageSide)};
       }
       if (!file || !skip_value(file, type, size, file_bytes)) {
         return Error{
             ErrorKind::bad_input,
-            fmt::format("{}: not a readable EXR file: attribute {} is not as long as it says",
-                        path.string(), name)};
+            fmt::format("{}: not a readable EXR file: attribute {} is not as long as it says", path,
+                        name)};
       }
     }
     if (is_empty || !multi_part || !file) return {};
   }
+}
+
+}  // namespace
+
+Status check_exr_attributes(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uint64_t file_bytes = std::filesystem::file_size(path, error);
+  std::ifstream file(path, std::ios::binary);
+  return check_attributes(file, file_bytes, path.string());
+}
+
+Status check_exr_attributes(const std::string& name, ByteView exr) {
+  std::istringstream file(std::string(reinterpret_cast<const char*>(exr.data()), exr.size()));
+  return check_attributes(file, exr.size(), name);
 }
 
 }  // namespace baton

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "common/base/bytes.h"
 #include "common/base/result.h"
 
 namespace baton {
@@ -11,5 +12,7 @@ namespace baton {
 /// than an image may be. OpenEXR believes them: a text of a few bytes that claims gigabytes, or a
 /// row of 16 million pixels, costs gigabytes.
 Status check_exr_attributes(const std::filesystem::path& path);
+/// Of bytes that were read from a file of this name.
+Status check_exr_attributes(const std::string& name, ByteView exr);
 
 }  // namespace baton

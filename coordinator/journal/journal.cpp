@@ -153,6 +153,8 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
                database_.prepare("SELECT renderer FROM renderers WHERE job = ?"));
   BATON_ASSIGN(const bool is_known, renderer.bind(digest).step());
   if (is_known) result.renderer = renderer.text(0);
+  BATON_ASSIGN(SqlStatement mixed, database_.prepare("SELECT 1 FROM mixed_jobs WHERE job = ?"));
+  BATON_ASSIGN(result.is_mixed, mixed.bind(digest).step());
   return result;
 }
 
@@ -299,7 +301,8 @@ Status Journal::delete_job(const Digest& job) {
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM owners WHERE job = ?",
         "DELETE FROM frame_files WHERE job = ?", "DELETE FROM output_marks WHERE job = ?",
         "DELETE FROM marked_folders WHERE job = ?", "DELETE FROM versions WHERE document = ?",
-        "DELETE FROM renderers WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"})
+        "DELETE FROM renderers WHERE job = ?", "DELETE FROM mixed_jobs WHERE job = ?",
+        "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   BATON_TRY(change("DELETE FROM growth WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM locked_frames WHERE id NOT IN (SELECT id FROM versions)"));
@@ -334,7 +337,8 @@ Status Journal::record_failure(const Failure& failure) {
       std::int64_t{failure.permanent} | std::int64_t{failure.last} << 1);
 }
 
-Status Journal::record_renderer(const Digest& job, const std::string& renderer) {
+Status Journal::record_renderer(const Digest& job, const std::string& renderer, bool is_mixed) {
+  if (is_mixed) BATON_TRY(change("INSERT OR IGNORE INTO mixed_jobs (job) VALUES (?)", job));
   return change("INSERT OR REPLACE INTO renderers (job, renderer) VALUES (?, ?)", job, renderer);
 }
 

@@ -27,6 +27,7 @@ struct JournalledJob {
   Completions completions;  ///< in the order in which they were recorded
   std::vector<Failure> failures;
   std::string renderer = {};  ///< of what is done of it; empty: not known
+  bool is_mixed = false;      ///< others have made some of it, too
 };
 
 /// How the file of a finished frame stood when its bytes had this digest.
@@ -125,7 +126,7 @@ class Journal {
   Status record_outputs(const Digest& job, const TaskKey& task,
                         const std::vector<BlobRef>& outputs);
   Status record_failure(const Failure& failure);
-  Status record_renderer(const Digest& job, const std::string& renderer);
+  Status record_renderer(const Digest& job, const std::string& renderer, bool is_mixed);
   Status record_frame_file(const Digest& job, const FrameFile& file);
   /// folder: that is marked now; nullopt: the mark goes.
   Status record_output_mark(const Digest& job, const std::optional<std::string>& folder);

@@ -56,7 +56,8 @@ Status Journal::restart_job(const Digest& job) {
        {"DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM failures WHERE job = ?",
         "DELETE FROM completions WHERE job = ?", "DELETE FROM frame_files WHERE job = ?",
-        "DELETE FROM renderers WHERE job = ?", "UPDATE jobs SET archived = 0 WHERE digest = ?"})
+        "DELETE FROM renderers WHERE job = ?", "DELETE FROM mixed_jobs WHERE job = ?",
+        "UPDATE jobs SET archived = 0 WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   return record_status(job, JobStatus::running);
 }

@@ -21,6 +21,7 @@ struct FormerJob {
   JobStatus status = JobStatus::running;
   std::map<FrameIndex, FrameStats> frames = {};  ///< what assemblies saw
   std::string renderer = {};                     ///< of what is done of it; empty: not known
+  bool is_mixed = false;                         ///< others have made some of it, too
 };
 
 /// What is there of what former jobs have made.

@@ -90,6 +90,7 @@ struct JobAdded {
   std::vector<BlobRef> lost_spares = {};
   JobPlan plan = {};          ///< its leading runs stand in `spec`, too
   std::string renderer = {};  ///< of what is done of it; empty: not known
+  bool is_mixed = false;      ///< others have made some of it, too
   std::string waits = {};     ///< for what, where it is paused
 };
 struct JobCancelled {
@@ -248,6 +249,7 @@ struct RecordJobStatus {
 struct RecordRenderer {
   Digest job;
   std::string renderer;
+  bool is_mixed = false;  ///< others have made some of it, too
 };
 /// All tasks of the job are done: FramesInspected, which should follow, says whether their files
 /// are still there.

@@ -68,6 +68,7 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
                  .first->second;
   job.waits = event.waits;
   job.renderer = event.renderer;
+  job.is_mixed = event.is_mixed;
   job.homes.share_out(leases_.alike(job.renderer));
   replay(job, event, actions);
   if (!is_open(event.status)) {
@@ -206,7 +207,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   if (claim.job->renderer.empty()) {
     claim.job->renderer = leases_.renderer_of(event.worker);
     if (!claim.job->renderer.empty())
-      actions.push_back(RecordRenderer{event.lease.job, claim.job->renderer});
+      actions.push_back(RecordRenderer{event.lease.job, claim.job->renderer, claim.job->is_mixed});
   }
   actions.push_back(RecordCompletion{event.lease.job, std::move(completion)});
   end_lease(event.lease.job, claim.task, LeaseEnd::done, {}, actions);
@@ -222,9 +223,10 @@ bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<Bl
                                     reported.end(), [](const BlobRef& a, const BlobRef& b) {
                                       return a.is_placeholder() || b.is_placeholder() || a == b;
                                     });
-  if (rules_.may_take_over || e == expected.end() || r == reported.end()) return true;
   const Digest digest = event.lease.job;
   Job& job = jobs_.at(digest);
+  const bool may_differ = rules_.may_take_over || job.is_mixed;
+  if (may_differ || e == expected.end() || r == reported.end()) return true;
   const std::string& maker = job.tasks.made().maker(*job.tasks.graph().find(event.lease.task));
   actions.push_back(ReportConflict{event.lease, event.worker, maker, *e, *r});
   if (job.status != JobStatus::running) return false;

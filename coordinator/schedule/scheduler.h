@@ -58,6 +58,7 @@ class Scheduler {
     std::array<TimePoint, 3> rests_until = {};  ///< tasks of each kind
     std::string waits = {};                     ///< for what, as far as an event said so
     std::string renderer = {};                  ///< of what is done; empty: not known
+    bool is_mixed = false;                      ///< others have made some of it, too
     /// Since then nobody renders so, and others would take over.
     std::optional<TimePoint> alone_since = {};
     Standings standings = {};

@@ -268,8 +268,9 @@ bool Scheduler::take_over(const std::string& worker, const Digest& digest, Job& 
     record.tasks.push_back(job.tasks.graph().key(task));
   if (!record.tasks.empty()) actions.push_back(std::move(record));
   job.renderer = leases_.renderer_of(worker);
+  job.is_mixed = true;
   job.alone_since.reset();
-  actions.push_back(RecordRenderer{digest, job.renderer});
+  actions.push_back(RecordRenderer{digest, job.renderer, job.is_mixed});
   return true;
 }
 

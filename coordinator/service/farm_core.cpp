@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -136,11 +137,18 @@ Result<std::optional<JobDetail>> FarmCore::archived_detail(const Digest& job) {
   return std::optional(std::move(detail));
 }
 
-Result<bool> FarmCore::explain_failed(const Digest& job, const std::string& reason) {
+Result<bool> FarmCore::explain_ended(const Digest& job, const std::string& reason,
+                                     bool done_counts) {
   BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
   if (!detail) return false;
-  const JobSummary& summary = detail->summary;
-  if (summary.status != JobStatus::failed || summary.tasks_failed > 0) return false;
+  JobSummary& summary = detail->summary;
+  const bool has_failed = summary.status == JobStatus::failed && summary.tasks_failed == 0;
+  const bool was_done = summary.status == JobStatus::done;
+  if (!has_failed && !(was_done && done_counts)) return false;
+  if (!reason.empty() && was_done) {
+    summary.status = JobStatus::failed;
+    BATON_TRY(history.status_changed(job, summary.status, reason));
+  }
   detail->waits = reason;
   BATON_TRY(journal.describe_archived(job, summary.status, to_bytes(summary), to_bytes(*detail)));
   return true;
@@ -226,7 +234,7 @@ Status FarmCore::perform(const RecordJobStatus& action) {
 }
 
 Status FarmCore::perform(const RecordRenderer& action) {
-  return journal.record_renderer(action.job, action.renderer);
+  return journal.record_renderer(action.job, action.renderer, action.is_mixed);
 }
 
 Status FarmCore::perform(const InspectFrames& action) {
@@ -352,6 +360,8 @@ Result<std::string> FarmCore::mark_output(const Digest& job) {
   if (open == nullptr || !is_open(open->status)) return std::string();
   const fs::path file = output_token_file(open->spec.output.directory, job);
   const std::string frames = format_frames(locked(job, open->spec).numbers(open->spec));
+  if (!frames.empty())
+    tell_locks(open->spec, history.jobs(), history.jobs().of(job).id, options.roots);
   const Result<std::string> there = read_after_token(file, token);
   if (marked_.contains(job) && (lost_mark(job, open->spec) || (there && *there == frames)))
     return token;

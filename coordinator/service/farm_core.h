@@ -136,8 +136,9 @@ class FarmCore {
   Result<JobDetail> living_detail(const Digest& job);
   /// Describes a job of the archive; nullopt: it is not there.
   Result<std::optional<JobDetail>> archived_detail(const Digest& job);
-  /// Replaces the reason of a job that has failed for its frames alone. Returns whether it is one.
-  Result<bool> explain_failed(const Digest& job, const std::string& reason);
+  /// A job that has failed for its frames alone, or was done where that counts, has failed for this
+  /// reason; empty: it stays as it is, but for one that it had. Returns whether it is such a job.
+  Result<bool> explain_ended(const Digest& job, const std::string& reason, bool done_counts);
 
  private:
   // Actions of the scheduler.

@@ -70,23 +70,26 @@ FileContent FileReader::read(const FileToRead& file) const {
   }
   content.stamp = *stamp;
   if (!content.stamp) return content;
+  Bytes bytes;
   if (!file.expected.empty() && file.known == content.stamp) {
     content.digest = file.expected.front();
-  } else if (const Result<Digest> digest = disk_.digest(file.path)) {
-    content.digest = *digest;
+  } else if (Result<Bytes> read = disk_.read(file.path)) {
+    bytes = std::move(read).value();
+    content.digest = digest_of(bytes);
   } else {
     // It may have gone meanwhile.
     const Result<std::optional<FileStamp>> now = stamp_of(file.path);
     if (now && !*now) {
       content.stamp.reset();
     } else {
-      content.fault = digest.error().message;
+      content.fault = read.error().message;
     }
     return content;
   }
   if (file.expected.empty() && !file.is_frame) return content;
   content.is_expected = std::ranges::find(file.expected, *content.digest) != file.expected.end();
-  if (!content.is_expected) content.writer = disk_.picture_writer(file.path);
+  if (!content.is_expected)
+    content.writer = disk_.picture_writer(file.path.filename().string(), bytes);
   return content;
 }
 

@@ -44,11 +44,12 @@ struct FilesRead {
 
 /// How files are read; a test may have a slow or a broken disk.
 struct Disk {
-  std::function<Result<Digest>(const std::filesystem::path&)> digest = digest_of_file;
-  /// The job that wrote a whole picture, in hexadecimal digits, as far as it says; nullopt:
-  /// the file is none.
-  std::function<std::optional<std::string>(const std::filesystem::path&)> picture_writer =
-      [](const auto&) { return std::nullopt; };
+  /// All of a file. Errors: those of read_file.
+  std::function<Result<Bytes>(const std::filesystem::path&)> read = read_whole_file;
+  /// The job that wrote a whole picture, in hexadecimal digits, as far as it says; nullopt: the
+  /// bytes are none. name: of the file, without its folder.
+  std::function<std::optional<std::string>(const std::string& name, const Bytes&)> picture_writer =
+      [](const auto&, const auto&) { return std::nullopt; };
 };
 
 /// Reads whole files on a thread of its own, since a slow disk may need minutes for them: one file

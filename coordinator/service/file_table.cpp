@@ -4,9 +4,8 @@
 
 namespace baton {
 
-Result<Digest> digest_of_file(const std::filesystem::path& path) {
-  BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxBlobBytes));
-  return digest_of(bytes);
+Result<Bytes> read_whole_file(const std::filesystem::path& path) {
+  return read_file(path, limits::kMaxBlobBytes);
 }
 
 FileVerdict judge_locked(const std::filesystem::path& path) {

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "common/base/bytes.h"
 #include "common/base/file_stamp.h"
 #include "common/base/limits.h"
 #include "common/base/result.h"
@@ -46,8 +47,8 @@ struct FileVerdict {
   std::string writer = {};  ///< likewise: FileContent::writer
 };
 
-/// Reads all of a file. Errors: those of read_file.
-Result<Digest> digest_of_file(const std::filesystem::path& path);
+/// All of a file. Errors: those of read_file.
+Result<Bytes> read_whole_file(const std::filesystem::path& path);
 /// How the file of a locked frame stands, whatever is in it: right, absent or unreadable.
 FileVerdict judge_locked(const std::filesystem::path& path);
 /// What was read, beside what was recorded; nullptr: nothing was.

@@ -8,6 +8,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
+#include "common/store/frame_locks.h"
 #include "coordinator/service/farm_document.h"
 
 namespace baton {
@@ -18,6 +19,7 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& fol
                                         const Digest& version, const JobId& id) {
   FolderRecord record;
   record.jobs_.push_back(version);
+  if (auto locks = locks_of_others(folder, id.hex())) record.locked_ = std::move(*locks);
   BATON_ASSIGN(const auto given_up, journal.given_up(id));
   for (const auto& [file, picture] : given_up) record.given_up_[fs::path(folder) / file] = picture;
   BATON_ASSIGN(const std::vector<Digest> jobs, jobs_in_folder(journal, folder));
@@ -46,6 +48,7 @@ std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
 }
 
 bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture) const {
+  if (is_locked(path)) return false;
   const auto given_up = given_up_.find(path);
   if (given_up != given_up_.end() && given_up->second == picture.digest) return true;
   const auto found = images_.find(path);
@@ -60,8 +63,15 @@ bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture)
          std::ranges::none_of(images, [&](const Image& image) { return image.job == *writer; });
 }
 
+bool FolderRecord::is_foreign(const FileVerdict& picture) const {
+  return !picture.writer.empty() && std::ranges::none_of(jobs_, [&](const Digest& job) {
+    return job.hex() == picture.writer;
+  });
+}
+
 std::vector<Digest> FolderRecord::replaceable(const fs::path& path) const {
   std::vector<Digest> digests;
+  if (is_locked(path)) return digests;
   if (const auto given_up = given_up_.find(path); given_up != given_up_.end())
     digests.push_back(given_up->second);
   const std::vector<BlobRef> images = images_of(path);
@@ -105,7 +115,8 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
     } else if (verdict.state == FileState::unreadable) {
       odd.unreadable = verdict.fault;
     } else if (verdict.state == FileState::strange && !record.may_replace(path, verdict)) {
-      odd.doubt.strange.push_back({path.string(), number, verdict.digest});
+      odd.doubt.strange.push_back(
+          {path.string(), number, verdict.digest, record.is_foreign(verdict)});
     }
   }
   return odd;
@@ -134,10 +145,13 @@ std::string doubt_text(const FramesInDoubt& doubt, const JobId& job) {
   std::string text;
   if (const auto& frames = doubt.strange; !frames.empty()) {
     const bool is_one = frames.size() == 1;
+    const bool are_foreign = std::ranges::all_of(frames, &FramesInDoubt::Frame::is_foreign);
     text = fmt::format(
-        "{} {} not what a job has written here: another picture, changed or replaced, which is "
-        "kept; --restart renders {} again",
-        files_text(frames), is_one ? "is" : "are", is_one ? "it" : "them");
+        "{} {} not what a job has written here: {}, which is kept; --restart renders {} again",
+        files_text(frames), is_one ? "is" : "are",
+        are_foreign ? "by a job that this coordinator does not know (deleted, or another's)"
+                    : "another picture, changed or replaced",
+        is_one ? "it" : "them");
     if (!job.empty())
       text += fmt::format(", `baton job lock {} --frames {}` keeps {} for good", job.short_hex(),
                           numbers_text(frames), is_one ? "it" : "them");

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,11 @@ class FolderRecord {
   /// What the file of a frame may be, as far as it is recorded.
   std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
   /// Whether a picture in the place of a frame may be replaced: a person has given it up, or it is
-  /// a job's of this folder, one that is recorded, or one that was written and never reported.
+  /// a job's of this folder, one that is recorded, or one that was written and never reported. None
+  /// that another job has locked (common/store/frame_locks.h), none while that cannot be read.
   bool may_replace(const std::filesystem::path& path, const FileVerdict& picture) const;
+  /// Whether a picture is as a job wrote it that is none of this folder's.
+  bool is_foreign(const FileVerdict& picture) const;
   /// Those of which only the digest must be known for that: at most kMostTold, the newest of them.
   std::vector<Digest> replaceable(const std::filesystem::path& path) const;
   void give_up(const std::filesystem::path& path, const Digest& picture);
@@ -37,9 +41,15 @@ class FolderRecord {
     Digest job;
     BlobRef image;
   };
+  bool is_locked(const std::filesystem::path& path) const {
+    return !locked_ || locked_->contains(path.filename().string());
+  }
+
   static constexpr std::size_t kMostTold = 256;
   std::map<std::filesystem::path, std::vector<Image>> images_;
   std::map<std::filesystem::path, Digest> given_up_;
+  /// By others, by name; nullopt: that cannot be read.
+  std::optional<std::map<std::string, std::string>> locked_;
   std::vector<Digest> jobs_;
 };
 
@@ -48,7 +58,8 @@ struct FramesInDoubt {
   struct Frame {
     std::string file;
     FrameNumber number{};
-    Digest digest = {};  ///< of a strange one
+    Digest digest = {};       ///< of a strange one
+    bool is_foreign = false;  ///< as a job wrote it that is not known here
   };
   std::vector<Frame> strange;        ///< files that are pictures of nobody here
   std::vector<Frame> locked_absent;  ///< locked, and not there

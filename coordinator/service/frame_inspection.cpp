@@ -86,8 +86,8 @@ Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
     if (record.may_replace(path, picture.second)) {
       lose(picture.first, path);
     } else {
-      found.doubt.strange.push_back(
-          {path.string(), number_of(picture.first), picture.second.digest});
+      found.doubt.strange.push_back({path.string(), number_of(picture.first), picture.second.digest,
+                                     record.is_foreign(picture.second)});
     }
   }
   return found;

@@ -1,14 +1,17 @@
 #include "coordinator/service/locked_frames.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <iterator>
 #include <map>
 
 #include "common/base/file_stamp.h"
+#include "common/job/file_sequence.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
+#include "common/store/frame_locks.h"
 
 namespace baton {
 
@@ -64,6 +67,32 @@ Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
     if (is_leased) return Error{ErrorKind::timeout, path.string() + ": a worker is writing it"};
   }
   return places;
+}
+
+void tell_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id,
+                const Roots& roots) {
+  if (!check_output_root(spec, roots)) return;
+  std::vector<std::string> files;
+  for (const FrameNumber frame : jobs.locked(id))
+    files.push_back(frame_file_name(spec.output.pattern, frame.value()));
+  const Status written = record_locks(spec.output.directory, id.hex(), files);
+  if (!written)
+    spdlog::warn("locks are not known to other coordinators: {}", written.error().message);
+}
+
+Result<LockedFrames> locked_elsewhere(const JobSpec& spec, const IdentityBook& jobs,
+                                      const JobId& id) {
+  const auto locks = locks_of_others(spec.output.directory, id.hex());
+  if (!locks) return Error{ErrorKind::io, locks.error().message};
+  std::vector<FrameNumber> frames;
+  for (const FrameNumber frame : spec.frames) {
+    const auto lock = locks->find(frame_file_name(spec.output.pattern, frame.value()));
+    if (lock == locks->end()) continue;
+    const std::optional<JobId> other = JobId::from_hex(lock->second);
+    if (!other || jobs.versions(*other).empty()) frames.push_back(frame);
+  }
+  std::ranges::sort(frames);
+  return LockedFrames(spec, frames);
 }
 
 Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,

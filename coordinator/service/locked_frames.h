@@ -7,7 +7,9 @@
 #include "common/base/result.h"
 #include "common/job/job_id.h"
 #include "common/job/job_spec.h"
+#include "common/job/text/roots.h"
 #include "coordinator/schedule/scheduler.h"
+#include "coordinator/service/identity_book.h"
 
 namespace baton {
 
@@ -37,6 +39,13 @@ std::string locked_text(const JobSpec& spec, const LockedFrames& locked);
 Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
                                                const std::vector<FrameNumber>& frames,
                                                const Scheduler::Job* job);
+/// Writes the locks of a job into its output folder, for other coordinators; where that cannot be
+/// written, they do not learn of them.
+void tell_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id, const Roots& roots);
+/// Which frames of a job jobs have locked that only another coordinator knows. Errors, io: what the
+/// folder says of that cannot be read.
+Result<LockedFrames> locked_elsewhere(const JobSpec& spec, const IdentityBook& jobs,
+                                      const JobId& id);
 /// Error (bad_input): some of these frames are not among those that are locked in the job.
 Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,
                      const std::vector<FrameNumber>& frames);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <set>
 #include <thread>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
+#include "common/store/frame_locks.h"
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/plan_text.h"
@@ -95,6 +97,7 @@ Status Service::restore_job(const Digest& digest) {
   event.spec.leading_runs = known.plan.leading_runs;
   event.plan = std::move(known.plan);
   event.renderer = std::move(known.renderer);
+  event.is_mixed = known.is_mixed;
 
   // An open job needs every file that it counts on. What cannot be looked at now is not gone: the
   // job waits to be resumed.
@@ -193,6 +196,19 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   if (const Status folder = expect_folder(document->job.output.directory); !folder)
     return farm_.refuse(peer, folder.error());
   BATON_ASSIGN(const JobId id, submission.known_job(*document));
+  const Result<LockedFrames> elsewhere = locked_elsewhere(document->job, farm_.history.jobs(), id);
+  if (!elsewhere) return farm_.refuse(peer, elsewhere.error());
+  if (!elsewhere->frames().empty()) {
+    return farm_.refuse(
+        peer,
+        {ErrorKind::bad_input,
+         fmt::format("job '{}': frames {} in {} are locked by a job of another coordinator, and "
+                     "stay: unlock them there or, if it is gone, remove {}; another "
+                     "output.directory keeps them",
+                     document->job.name, format_frames(elsewhere->numbers(document->job)),
+                     document->job.output.directory,
+                     lock_file(document->job.output.directory).string())});
+  }
   const LockedFrames locked(document->job, farm_.history.jobs().locked(id));
   BATON_ASSIGN(const std::optional<OddFrames> odd,
                await_frames(peer, message, {document->digest, id}, document->job, locked));
@@ -204,7 +220,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   if (!odd->unreadable.empty() && !may_replace && !runs && may_pass(document->digest))
     return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + odd->unreadable});
   pass(document->digest);
-  if (!fault.empty() && peer.empty()) BATON_TRY(farm_.explain_failed(document->digest, fault));
+  if (!fault.empty() && peer.empty()) BATON_TRY(farm_.explain_ended(document->digest, fault, true));
   if (!fault.empty() && !may_replace && !runs)
     return farm_.refuse(peer,
                         {ErrorKind::io, fmt::format("job '{}': {}", document->job.name, fault)});
@@ -364,31 +380,42 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   std::vector<FrameNumber> frames = message.frames;
   std::ranges::sort(frames);
   frames.erase(std::ranges::unique(frames).begin(), frames.end());
+  const JobId id = farm_.history.jobs().of(*job).id;
+  const std::vector<FrameNumber> before = farm_.history.jobs().locked(id);
+  const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
   std::vector<FrameIndex> places;
+  std::vector<FrameNumber> after;
   if (message.off) {
-    const JobId id = farm_.history.jobs().of(*job).id;
-    const Status may = expect_locked(id, farm_.history.jobs().locked(id), frames);
+    const Status may = expect_locked(id, before, frames);
     if (!may) return farm_.refuse(peer, may.error());
+    std::ranges::set_difference(before, frames, std::back_inserter(after));
   } else {
-    Result<std::vector<FrameIndex>> found =
-        frames_to_lock(document->job, frames, farm_.scheduler.find_job(*job));
+    Result<std::vector<FrameIndex>> found = frames_to_lock(document->job, frames, known);
     if (!found) return farm_.refuse(peer, found.error());
     places = std::move(found).value();
+    std::ranges::set_union(before, frames, std::back_inserter(after));
+  }
+  // Of a job that has ended it is told at once how its frames stand then.
+  if (known == nullptr || !is_open(known->status)) {
+    BATON_ASSIGN(
+        const std::optional<OddFrames> odd,
+        await_frames(peer, message, {*job, id}, document->job, LockedFrames(document->job, after)));
+    if (!odd) return {};
   }
   BATON_TRY(farm_.history.locked(*job, frames, !message.off));
   std::set<std::string> files;
   for (const FrameNumber frame : frames)
     files.insert(frame_file_name(document->job.output.pattern, frame.value()));
-  BATON_TRY(farm_.take_back(farm_.history.jobs().of(*job).id,
-                            [&](const std::string& file) { return files.contains(file); }));
+  BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return files.contains(file); }));
   spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
   if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
-  // A job that has failed for its frames alone ends as they stand now.
-  BATON_ASSIGN(const bool may_be_done,
-               message.off ? Result<bool>(false) : farm_.explain_failed(*job, {}));
-  if (may_be_done) BATON_TRY(receive(PeerId(), SubmitJob{*text, false}));
+  tell_locks(document->job, farm_.history.jobs(), id, farm_.options.roots);
+  // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
+  // stand now.
+  BATON_ASSIGN(const bool is_looked_at, farm_.explain_ended(*job, {}, message.off));
+  if (is_looked_at) BATON_TRY(receive(PeerId(), SubmitJob{*text, false}));
   return answer_detail(peer, *job);
 }
 
@@ -402,6 +429,13 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
                                                              job_status_name(known->status))});
   }
   const JobId id = farm_.history.jobs().of(*job).id;
+  BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
+  const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+  const std::vector<FrameNumber> locked = farm_.history.jobs().locked(id);
+  if (document && !locked.empty()) {
+    BATON_TRY(farm_.history.locked(*job, locked, false));
+    tell_locks(document->job, farm_.history.jobs(), id, farm_.options.roots);
+  }
   for (const Digest& version : farm_.history.jobs().versions(id)) {
     BATON_TRY(farm_.archive_job(version));
     BATON_ASSIGN(const std::vector<Digest> kept, farm_.journal.kept_blobs(version));

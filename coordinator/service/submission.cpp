@@ -50,7 +50,8 @@ Result<std::vector<Submission::InFolder>*> Submission::jobs_in(const std::string
                      std::move(known.plan),
                      known.status,
                      std::move(known.completions.frames),
-                     std::move(known.renderer)};
+                     std::move(known.renderer),
+                     known.is_mixed};
     former.document.job.leading_runs = former.plan.leading_runs;
     former.document.job.output.directory = folder;
     entry->second.push_back({job, std::move(former)});
@@ -162,11 +163,9 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
                           const SubmitJob& message,
                           const std::vector<FramesInDoubt::Frame>& strange) {
   const Scheduler::Job* const known = farm_.scheduler.find_job(document.digest);
-  if (known == nullptr || known->status != JobStatus::running) {
-    const bool is_new = farm_.history.jobs().of(document.digest).id.empty();
-    if (const Status own = farm_.check_own(speaker_, document.digest); !is_new && !own)
-      return farm_.refuse(peer, own.error());
-  }
+  const bool is_new = farm_.history.jobs().of(document.digest).id.empty();
+  if (const Status own = farm_.check_own(speaker_, document.digest); !is_new && !own)
+    return farm_.refuse(peer, own.error());
   // What cannot go on, since nobody renders as it was rendered, begins again.
   const bool begins_again = known != nullptr && message.restart &&
                             farm_.scheduler.leases().nobody_renders_as(known->renderer);
@@ -268,6 +267,7 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   std::vector<FormerJob> formers;
   // Where frames of a job are by one renderer, that of the newest which has frames decides.
   std::string newest;
+  std::set<std::string> renderers;
   bool has_frames = false;
   for (const auto& [digest, former] : *neighbours) {
     if (!(former.document.picture == document.picture) || former.renderer.empty()) continue;
@@ -286,6 +286,8 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
       reasons.push_back("nothing is kept that was rendered with " + former.renderer);
       continue;
     }
+    heritage.is_mixed = heritage.is_mixed || former.is_mixed;
+    if (!former.renderer.empty()) renderers.insert(former.renderer);
     formers.push_back(std::move(former));
     heritage.formers.push_back(digest);
   }
@@ -316,6 +318,7 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   } else if (!adoption.frames.empty() && !farm_.options.mixed_builds) {
     heritage.renderer = newest;
   }
+  heritage.is_mixed = (heritage.is_mixed || renderers.size() > 1) && !adoption.empty();
   return heritage;
 }
 
@@ -357,7 +360,9 @@ Status Submission::take_over(const Heritage& heritage, const std::string& text, 
   }
   BATON_TRY(farm_.journal.record_plan(event.job, adoption.plan));
   event.renderer = heritage.renderer;
-  if (!event.renderer.empty()) BATON_TRY(farm_.journal.record_renderer(event.job, event.renderer));
+  event.is_mixed = heritage.is_mixed;
+  if (!event.renderer.empty() || event.is_mixed)
+    BATON_TRY(farm_.journal.record_renderer(event.job, event.renderer, event.is_mixed));
   if (!speaker_.name.empty() && !farm_.owners.contains(event.job)) {
     farm_.owners[event.job] = speaker_.name;
     BATON_TRY(farm_.journal.record_owner(event.job, speaker_.name));

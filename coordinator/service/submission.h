@@ -70,6 +70,7 @@ class Submission {
     std::vector<Digest> formers;
     Adoption adoption;
     std::string renderer;
+    bool is_mixed = false;  ///< others have made some of it, too
   };
   Result<Heritage> find_heritage(const ParsedJobDocument& document, bool restart,
                                  const LockedFrames& locked, std::vector<std::string>& reasons);

@@ -49,20 +49,36 @@ long long num_bytes(const struct stat& status) {
   return S_ISREG(status.st_mode) ? static_cast<long long>(status.st_size) : 0;
 }
 
-}  // namespace
-
-extern "C" int renameat(int from_folder, const char* from, int to_folder, const char* to) noexcept {
-  using Call = int (*)(int, const char*, int, const char*);
-  static const auto call = original<Call>("renameat");
+/// rename(): does it.
+template <class Rename>
+int noted_rename(const Rename& rename, int from_folder, const char* from, int to_folder,
+                 const char* to) {
   const auto since_start = std::chrono::steady_clock::now().time_since_epoch();
   const long long ms = std::chrono::duration_cast<std::chrono::milliseconds>(since_start).count();
-  const int result = call(from_folder, from, to_folder, to);
+  const int result = rename();
   struct stat status {};
   if (result == 0 && ::fstatat(to_folder, to, &status, 0) == 0) {
     note("rename %s/%s %s/%s %lld %lld\n", path_of(from_folder).data(), from,
          path_of(to_folder).data(), to, num_bytes(status), ms);
   }
   return result;
+}
+
+}  // namespace
+
+extern "C" int renameat(int from_folder, const char* from, int to_folder, const char* to) noexcept {
+  using Call = int (*)(int, const char*, int, const char*);
+  static const auto call = original<Call>("renameat");
+  return noted_rename([&] { return call(from_folder, from, to_folder, to); }, from_folder, from,
+                      to_folder, to);
+}
+
+extern "C" int renameat2(int from_folder, const char* from, int to_folder, const char* to,
+                         unsigned int flags) noexcept {
+  using Call = int (*)(int, const char*, int, const char*, unsigned int);
+  static const auto call = original<Call>("renameat2");
+  return noted_rename([&] { return call(from_folder, from, to_folder, to, flags); }, from_folder,
+                      from, to_folder, to);
 }
 
 extern "C" int remove(const char* file) noexcept {

@@ -73,7 +73,7 @@ def edits_of(job, rng):
              ("AOVs", {"output": {"aovs": rng.choice([["depth"], ["normal", "depth"]])}})]
     sweeps = job.edits.get("quality", {}).get("sweeps", 1)
     if sweeps == 1:  # a later sweep begins with what the last frame hands on: other frames are another picture
-        edits.append(("frames", {"frames": f"1-{rng.randrange(2, last + 1)}"}))
+        edits += [("frames", {"frames": f"1-{number}"}) for number in (rng.randrange(2, last), last)]
     if job.kind == "motion" and sweeps < 3:
         edits.append(("sweeps", {"quality": {"sweeps": sweeps + 1, "refinable": True}}))
     return edits

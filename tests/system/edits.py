@@ -43,8 +43,10 @@ class Workers:
         self.next_at = time.monotonic() + self.rng.uniform(*SWITCH_S)
 
     def tend(self):
-        if time.monotonic() < self.next_at:
-            return
+        if time.monotonic() >= self.next_at:
+            self.switch()
+
+    def switch(self):
         for worker in self.workers:
             worker.kill() if self.rng.random() < 0.2 else worker.terminate()
         for worker in self.workers:
@@ -54,14 +56,19 @@ class Workers:
         self.num_switches += 1
         self.start()
 
+    def wait_until_there(self):
+        first = self.num_started - NUM_WORKERS + 1
+        names = [f"worker {self.isa}-{number} joined" for number in range(first, self.num_started + 1)]
+        wait_until(lambda: all(name in self.farm.coordinator.log() for name in names), f"{names}", END_S)
+
 
 class Sequence:
     """One job and its edits."""
 
-    def __init__(self, farm, number, seed):
-        self.farm, self.rng, self.diary = farm, random.Random(seed), []
+    def __init__(self, farm, workers, number, seed):
+        self.farm, self.workers, self.rng, self.diary = farm, workers, random.Random(seed), []
         self.job = Job(self.rng.choice(list(KINDS)), f"-{number}", farm.folder)
-        self.next_at = 0
+        self.next_at, self.waits_for_end = 0, False
         self.left = EDITS
 
     def submit(self, *options):
@@ -73,14 +80,18 @@ class Sequence:
 
     def tend(self):
         """Edits the job when it is time. Returns whether it has ended."""
-        if time.monotonic() < self.next_at:
+        if time.monotonic() < self.next_at or (self.waits_for_end and self.farm.show(self.job.id)["status"] != "done"):
             return False
         if self.job.id is None:
             self.submit()
         elif self.left > 0:
             what, settings = self.rng.choice(edits_of(self.job, self.rng))
             self.job.edit(**settings)
-            options = ["--restart"] if self.rng.random() < 0.3 else []
+            options = ["--restart"] if self.rng.random() < 0.4 else []
+            # What is done is by the others then, and is made anew.
+            if options and self.rng.random() < 0.5:
+                self.workers.switch()
+                self.workers.wait_until_there()
             self.diary.append(f"{what} {json.dumps(settings)}{' --restart' if options else ''}")
             self.submit(*options)
             self.left -= 1
@@ -96,6 +107,7 @@ class Sequence:
             waiter.wait()
         # From at once to after the end.
         self.next_at = time.monotonic() + self.rng.choice([0, 0.3, 1, 3]) * self.rng.random()
+        self.waits_for_end = self.rng.random() < 0.5
         return False
 
     def __str__(self):
@@ -111,7 +123,7 @@ def run(programs, folder, num_sequences, seed):
         farm = stack.enter_context(Farm(programs, folder / "farm", workers=0))
         workers = Workers(farm, seed)
         for first in range(0, num_sequences, AT_ONCE):
-            sequences = [Sequence(farm, number, f"{seed} {number}") for number in range(first, min(first + AT_ONCE, num_sequences))]
+            sequences = [Sequence(farm, workers, number, f"{seed} {number}") for number in range(first, min(first + AT_ONCE, num_sequences))]
             waiting = list(sequences)
 
             def all_done():

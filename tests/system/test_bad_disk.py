@@ -7,7 +7,7 @@ import resource
 from pathlib import Path
 
 from assets import write_map
-from farm import OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
+from farm import IO, OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import camera_keys, make_job, write_job
 
 
@@ -47,6 +47,29 @@ def errors_of_the_moment_end_no_job(programs, folder):
             logs = farm.coordinator.log() + "".join(worker.log() for worker in farm.workers)
             check("no plain file" not in logs and "missing" not in logs, logs)
         check_equal(programs.pixels(place / "frames"), expected, f"pixels with errors of {name}")
+
+
+def a_picture_that_cannot_be_seen_well_is_kept(programs, folder):
+    """Of one in the place of a frame that is to be made every second look fails, or the worker sees it later than others."""
+    if not library(programs):
+        return
+    programs.render(write_job(folder / "other/job.json", moving(folder / "other", seed=77)), folder / "other/work")
+    painted = (folder / "other/frames/frame.0003.exr").read_bytes()
+    for name, environment in (("errors", {"BATON_FILE_FAULTS": "2:/frame.0003.exr"}), ("late", {"BATON_FILES_LATE": "20000:/frame.0003.exr"})):
+        place = folder / name
+        with Farm(programs, place / "farm") as farm:
+            ident = farm.submit(write_job(place / "job.json", moving(place)))
+            (place / "frames").mkdir(exist_ok=True)
+            (place / "frames/frame.0003.exr").write_bytes(painted)
+            farm.environment = {"LD_PRELOAD": str(library(programs)), **environment}
+            worker = farm.start_worker()
+            wait_until(lambda: "frame.0003.exr" in farm.show(ident).get("waits", ""), f"{name}: the picture is told of")
+            worker.terminate()
+            worker.wait()
+            farm.environment = {}
+            farm.start_worker()
+            check_says(farm.baton("job", "wait", ident, expect=IO).stdout, "frame.0003.exr is not what a job has written")
+        check_equal((place / "frames/frame.0003.exr").read_bytes(), painted, f"the painted frame, {name}")
 
 
 def what_is_seen_late_is_not_made_again(programs, folder):

@@ -214,12 +214,18 @@ def a_folder_that_was_moved_is_the_same(programs, folder):
 
             check_says(submit("1-5").stdout, ident, "frames 1-3 are kept")
             farm.wait_for(ident)
-            check_says(submit("1-3", "--restart", name="another", seed=9, output=str(place / "disk2"), expect=BAD_INPUT).stderr,
-                       "are locked in job")
+            another = {"name": "another", "seed": 9, "output": str(place / "disk2"), "expect": BAD_INPUT}
+            check_says(submit("1-3", "--restart", **another).stderr, "are locked in job")
             submit("1-5", "--restart", seed=9)
             farm.wait_for(ident)
             check_equal((place / "disk2/frame.0003.exr").read_bytes(), painted, "the locked frame")
             check(files(place)[1] != before[1], "the other frames are of another picture")
+
+            # What it wrote there is its own still when the link leads elsewhere.
+            (place / FOLDER).unlink()
+            (place / "elsewhere").mkdir()
+            (place / FOLDER).symlink_to(place / "elsewhere")
+            check_says(submit("1-3", "--restart", **another).stderr, "are locked in job")
 
 
 def a_deleted_job_may_come_again(programs, folder):

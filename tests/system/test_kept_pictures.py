@@ -122,6 +122,65 @@ def a_locked_frame_outlives_everything(programs, folder):
         check_says(farm.baton("job", "submit", make_loose(folder, seed=6, frames=f"2-{FRAMES}", **renamed), expect=IO).stderr,
                    "beauty.0002.exr is not what a job has written")
 
+def a_lock_holds_for_other_coordinators(programs, folder):
+    """They do not know each other: what is locked stands in the folder."""
+    with Farm(programs, folder / "farm", workers=1) as farm, Farm(programs, folder / "other") as other:
+        ident = farm.submit(make(folder))
+        farm.wait_for(ident)
+        frame(folder, 2).write_bytes(painted := frame(folder, 3).read_bytes())
+        command = ["render", folder / "job.json", "--work-dir", folder / "work"]
+
+        # One that had begun before the lock does all but the locked frame.
+        begun = json.loads(other.baton("job", "submit", folder / "job.json", "--restart", "--json").stdout)["id"]
+        farm.baton("job", "lock", ident, "--frames", "2")
+        other.start_worker()
+        check_says(other.baton("job", "wait", begun, expect=IO).stdout, "frame.0002.exr is not what a job has written")
+        check_equal(frame(folder, 2).read_bytes(), painted, "the locked frame, begun before")
+
+        for extra in ([], ["--restart"]):
+            refused = programs.run("baton", *command, *extra, expect=BAD_INPUT)
+            check_says(refused.stderr, "frames 2 in", "are locked by a job of another coordinator", ".baton-locked")
+        check_equal(frame(folder, 2).read_bytes(), painted, "the locked frame")
+        farm.baton("job", "lock", ident, "--frames", "2", "--off")
+        check(not (folder / "frames/.baton-locked").exists(), "the file of locks stays")
+        farm.baton("job", "lock", ident, "--frames", "3")
+        farm.baton("job", "delete", ident)
+        check(not (folder / "frames/.baton-locked").exists(), "the file of locks outlives the job")
+        programs.run("baton", *command, "--restart", expect=OK)
+
+
+def what_is_unlocked_is_looked_at(programs, folder):
+    """Gone: it is rendered; another picture: the job has failed."""
+    expected = undisturbed(programs, folder)
+    with Farm(programs, folder / "farm", workers=1) as farm:
+        ident = farm.submit(make(folder))
+        farm.wait_for(ident)
+        farm.baton("job", "lock", ident, "--frames", "2-3")
+        frame(folder, 2).write_bytes(frame(folder, 4).read_bytes())
+        farm.baton("job", "lock", ident, "--frames", "2", "--off")
+        check_says(farm.baton("job", "wait", ident, expect=IO).stdout, "frame.0002.exr is not what a job has written")
+        frame(folder, 2).unlink()
+        frame(folder, 3).unlink()
+        farm.baton("job", "lock", ident, "--frames", "3", "--off")
+        farm.wait_for(ident)
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
+def a_byte_that_changed_is_seen_whatever_the_time_says(programs, folder):
+    with Farm(programs, folder / "farm", workers=1) as farm:
+        ident = farm.submit(make(folder))
+        farm.wait_for(ident)
+        before = frame(folder, 2).stat()
+        with frame(folder, 2).open("r+b") as file:
+            content = bytearray(file.read())
+            content[len(content) // 2] ^= 1
+            file.seek(0)
+            file.write(content)
+        os.utime(frame(folder, 2), ns=(before.st_atime_ns, before.st_mtime_ns))
+        said = farm.baton("job", "submit", folder / "job.json", expect=None)
+        check_says(said.stdout + said.stderr, "frame.0002.exr is")
+
+
 def a_picture_that_comes_before_its_frame_is_kept(programs, folder):
     """Nobody's here, it stays; --restart gives it up."""
     other = folder / "other"

@@ -161,6 +161,28 @@ def with_mixed_builds_a_frame_is_by_one(programs, folder):
     check_equal(set(order), {best, least}, "who made the frames")
 
 
+def what_unlike_renderers_made_is_not_compared(programs, folder):
+    """Not after the farm has stopped to mix them, either: nobody is at fault."""
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    path = make(folder, sampling={"numCandidates": 128})
+    with Farm(programs, folder / "farm", workers=None) as farm:
+        farm.start_coordinator(extra=("--mixed-builds",))
+        first = farm.start_worker(extra=("--isa", sets[-1]))
+        ident = farm.submit(path)
+        wait_until(lambda: farm.show(ident)["framesDone"] >= 2, "two frames are done")
+        first.kill()
+        farm.start_worker(extra=("--isa", sets[0]))
+        farm.wait_for(ident)
+        farm.coordinator.kill()
+        farm.start_coordinator()
+        (folder / "frames/frame.0001.exr").unlink()
+        farm.submit(path)
+        farm.wait_for(ident)
+        check("different bytes" not in farm.coordinator.log(), "they were compared")
+
+
 def the_one_command_says_so(programs, folder):
     sets = sets_of(programs)
     if len(sets) < 2:

@@ -276,18 +276,25 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
     plate_image = std::move(plate.picture);
   }
   std::optional<PictureInPlace> other;
-  const auto may_appear = [&](const Digest& made) -> Status {
+  const auto may_replace = [&](const Digest& made) -> Result<bool> {
     const std::filesystem::path path = frame_path(loaded.job, frame);
-    BATON_ASSIGN(other,
-                 patiently([&] { return find_picture_in_place(path, made, grant.may_replace); },
-                           store.stop()));
+    Result<FramePlace> place = patiently(
+        [&] { return look_at_place(path, made, grant.may_replace, loaded.id); }, store.stop());
+    if (!place) return Error{ErrorKind::timeout, place.error().message};
+    other = std::move(place->stays);
     if (other)
       return Error{ErrorKind::cancelled, path.string() + ": another picture is in its place"};
-    return expect_unlocked(loaded, frame, store.stop());
+    BATON_TRY(expect_unlocked(loaded, frame, store.stop()));
+    return !place->is_free;
   };
   const Result<WrittenFrame> written = write_frame(
-      loaded.job, loaded.digest, frame, std::move(image), plate_image, may_appear, store.stop());
+      loaded.job, loaded.digest, frame, std::move(image), plate_image, may_replace, store.stop());
   if (!written && other) return TaskResult{.made = {}, .in_place = std::move(other)};
+  if (!written && written.error().kind == ErrorKind::timeout) {
+    TaskResult unseen;
+    unseen.unseen = written.error().message;
+    return unseen;
+  }
   if (!written) return written.error();
   return TaskResult{.made = {.outputs = {written->file},
                              .frames = {{frame.value(), task.tile, {}, written->quality}}},

@@ -197,7 +197,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
 
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
                                  FilmTile image, const std::optional<RgbImage>& plate,
-                                 const std::function<Status(const Digest& made)>& may_appear,
+                                 const std::function<Result<bool>(const Digest& made)>& may_replace,
                                  const std::stop_token& stop) {
   FrameQuality quality = judge_frame(image);
   if (job.output.clamp_negative) clamp_negative(image);
@@ -232,11 +232,22 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
                            .display_window = job.image.whole()}));
   seal_frame(path.filename().string(), bytes);
   const Digest made = digest_of(bytes);
-  const auto check = [&](const std::filesystem::path& temporary) -> Status {
-    const Status verified = verify_frame(temporary, image, frame.value());
-    return verified && may_appear ? may_appear(made) : verified;
+  const auto check = [&](const std::filesystem::path& temporary) -> Result<bool> {
+    BATON_TRY(verify_frame(temporary, image, frame.value()));
+    return may_replace ? may_replace(made) : true;
   };
-  BATON_TRY(patiently([&] { return write_file_verified(path, bytes, check); }, stop));
+  Patience patience(stop);
+  for (bool is_written = false; !is_written;) {
+    const Result<bool> written = write_file_verified(path, bytes, check);
+    is_written = written && *written;
+    if (is_written) continue;
+    const Error error =
+        written ? Error{ErrorKind::io,
+                        path.string() + ": something is there that this machine does not see"}
+                : written.error();
+    if (patience.wait_after(error)) continue;
+    return written ? Error{ErrorKind::timeout, error.message} : error;
+  }
   return WrittenFrame{{BlobKind::image, frame.value(), 0, made, bytes.size()}, quality};
 }
 

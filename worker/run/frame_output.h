@@ -39,14 +39,16 @@ struct WrittenFrame {
 ///
 /// Before the file gets its name it is read back from disk: every byte must be the encoder's, the
 /// header and the table of blocks must be whole, and one block of rows, another one in each frame,
-/// must unpack to the film. may_appear is asked last, with the digest of the file: a job may have
-/// made way for another while the frame was written, or its place be taken. A disk that is away for
-/// a moment is waited for, until `stop` is requested. Errors: the disk, a file that is not what was
-/// written, that of may_appear.
-Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
-                                 FilmTile image, const std::optional<RgbImage>& plate = {},
-                                 const std::function<Status(const Digest& made)>& may_appear = {},
-                                 const std::stop_token& stop = {});
+/// must unpack to the film. may_replace is asked last, with the digest of the file: whether what is
+/// in its place may go; a job may have made way for another while the frame was written, and its
+/// place be taken. A disk that is away for a moment is waited for, until `stop` is requested.
+/// Errors: the disk, a file that is not what was written, that of may_replace; timeout, something
+/// is in its place that is not seen here and might not go.
+Result<WrittenFrame> write_frame(
+    const JobSpec& job, const Digest& job_digest, FrameIndex frame, FilmTile image,
+    const std::optional<RgbImage>& plate = {},
+    const std::function<Result<bool>(const Digest& made)>& may_replace = {},
+    const std::stop_token& stop = {});
 
 /// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
 /// `block` (0-based, modulo the number of blocks) its values. ErrorKind::corrupt names channel and

@@ -1,28 +1,35 @@
 #include "worker/run/frame_place.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/file_stamp.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/image/exr_check.h"
+#include "common/store/frame_locks.h"
 
 namespace baton {
 
-Result<std::optional<PictureInPlace>> find_picture_in_place(
-    const std::filesystem::path& frame, const Digest& made,
-    const std::vector<Digest>& may_replace) {
-  constexpr std::optional<PictureInPlace> kNothing;
+Result<FramePlace> look_at_place(const std::filesystem::path& frame, const Digest& made,
+                                 const std::vector<Digest>& may_replace, const JobId& job) {
+  // Whatever an error is of, it may have gone in a moment.
+  const auto of_the_moment = [](const Error& error) { return Error{ErrorKind::io, error.message}; };
   const Result<std::optional<FileStamp>> stamp = stamp_of(frame);
-  if (stamp && !*stamp) return kNothing;
-  const Result<Bytes> bytes = stamp ? read_file(frame, limits::kMaxBlobBytes) : stamp.error();
-  // Whatever it is, it may have gone in a moment.
-  if (!bytes) return Error{ErrorKind::io, bytes.error().message};
+  if (!stamp) return of_the_moment(stamp.error());
+  if (!*stamp) return FramePlace{.is_free = true};
+  const Result<Bytes> bytes = read_file(frame, limits::kMaxBlobBytes);
+  if (!bytes) return of_the_moment(bytes.error());
   const Digest there = digest_of(*bytes);
-  if (there == made || std::ranges::find(may_replace, there) != may_replace.end()) return kNothing;
-  std::optional<std::string> writer = writer_of_frame(frame);
-  if (!writer) return kNothing;
-  return std::optional(PictureInPlace{there, std::move(*writer)});
+  if (there == made) return FramePlace{};
+  const auto locks = locks_of_others(frame.parent_path(), job.hex());
+  if (!locks) return of_the_moment(locks.error());
+  if (locks->contains(frame.filename().string()))
+    return FramePlace{.stays = PictureInPlace{there, {}}};
+  if (std::ranges::find(may_replace, there) != may_replace.end()) return FramePlace{};
+  std::optional<std::string> writer = writer_of_frame(frame.filename().string(), *bytes);
+  if (!writer) return FramePlace{};
+  return FramePlace{.stays = PictureInPlace{there, std::move(*writer)}};
 }
 
 }  // namespace baton

@@ -7,6 +7,7 @@
 
 #include "common/base/digest.h"
 #include "common/base/result.h"
+#include "common/job/job_id.h"
 
 namespace baton {
 
@@ -17,11 +18,18 @@ struct PictureInPlace {
   std::string writer;
 };
 
-/// What must stay in the place of a frame whose bytes have the digest `made`. nullopt: nothing is
-/// there, or no whole picture, or the same bytes, or one of `may_replace`. Error, io: what is
-/// there cannot be read.
-Result<std::optional<PictureInPlace>> find_picture_in_place(const std::filesystem::path& frame,
-                                                            const Digest& made,
-                                                            const std::vector<Digest>& may_replace);
+/// How the place of a frame looks from this machine.
+struct FramePlace {
+  bool is_free = false;  ///< nothing is there
+  /// What must stay. nullopt: nothing is there, or no whole picture, or the same bytes, or what may
+  /// be replaced.
+  std::optional<PictureInPlace> stays = {};
+};
+
+/// made: the digest of the frame's bytes. may_replace: of pictures that may go. A picture that a
+/// job other than `job` has locked stays, whatever it is (common/store/frame_locks.h). Errors, io:
+/// what is there, or the locks, cannot be read now.
+Result<FramePlace> look_at_place(const std::filesystem::path& frame, const Digest& made,
+                                 const std::vector<Digest>& may_replace, const JobId& job);
 
 }  // namespace baton

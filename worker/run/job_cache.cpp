@@ -104,7 +104,8 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
                                                       .digest = document.job,
                                                       .picture = parsed.picture,
                                                       .context = nullptr,
-                                                      .token = document.token});
+                                                      .token = document.token,
+                                                      .id = document.id});
   loaded->job.output.directory = here.job.output.directory;
   BATON_TRY(check_roots(here, machine.roots));
   if (const Status seen = expect_output_folder(*loaded); !seen) {

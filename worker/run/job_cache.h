@@ -37,6 +37,7 @@ struct LoadedJob {
   /// What this machine does not see of the job, a line; then nothing of it is loaded.
   std::string unseen = {};
   std::string token = {};  ///< JobDocument::token
+  JobId id = {};           ///< of which job it is a version
   /// Files that the job reads, where this machine has them.
   std::vector<KnownAsset> assets = {};
 };

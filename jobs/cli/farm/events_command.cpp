@@ -84,6 +84,8 @@ Result<ExitCode> show_events(const EventsOptions& options) {
   BATON_ASSIGN(EventList found, ask<EventList>(client, question));
   print_forgotten(found.forgotten, options.json);
   print_events(found.events, options.json);
+  if (std::ssize(found.events) >= options.count)
+    fmt::print(stderr, "these are the newest {}; --last N shows more\n", options.count);
   question.query.is_newest = false;
   question.query.count = limits::kMaxEventsTold;
   while (options.follow) {
@@ -102,8 +104,10 @@ void add_events_command(CLI::App& farm, ExitCode& code) {
   CLI::App* events = farm.add_subcommand(
       "events", "What has happened: jobs, tasks, workers, with time, cause and duration");
   add_coordinator_options(*events, options->link);
-  events->add_option("--job", options->job,
-                     "of this job alone: its name, its ID, or its beginning");
+  events->add_option(
+      "--job", options->job,
+      "of this job alone: its name, its ID, or its beginning; all of the ID of one that "
+      "was deleted");
   events->add_option("--since", options->since,
                      "30s, 15m, 2h or 3d ago, or a time in UTC: 2026-11-28T13:20:46");
   events->add_option("--last", options->count, "at most so many, the newest")

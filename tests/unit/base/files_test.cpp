@@ -65,19 +65,38 @@ TEST_F(FilesTest, AFailedPublicationNamesThePathAndLeavesNothing) {
 TEST_F(FilesTest, AVerifiedFileGetsItsNameOnlyAfterTheCheck) {
   const fs::path file = folder_ / "frame";
   fs::path seen;
-  const Status written =
-      write_file_verified(file, as_bytes_view("content"), [&](const fs::path& temporary) {
+  const Result<bool> written = write_file_verified(
+      file, as_bytes_view("content"), [&](const fs::path& temporary) -> Result<bool> {
         seen = temporary;
         EXPECT_FALSE(fs::exists(file));
-        return expect_content(temporary, as_bytes_view("content"));
+        BATON_TRY(expect_content(temporary, as_bytes_view("content")));
+        return false;
       });
-  EXPECT_TRUE(written) << written.error().message;
+  ASSERT_TRUE(written) << written.error().message;
+  EXPECT_TRUE(*written);
   EXPECT_NE(seen, file);
   EXPECT_EQ(read_text_file(file, 100).value(), "content");
 
   const fs::path refused = folder_ / "refused";
-  const auto refuse = [](const fs::path&) -> Status { return Error{ErrorKind::corrupt, "no"}; };
+  const auto refuse = [](const fs::path&) -> Result<bool> {
+    return Error{ErrorKind::corrupt, "no"};
+  };
   EXPECT_FALSE(write_file_verified(refused, as_bytes_view("x"), refuse));
+  EXPECT_EQ(num_files(), 1);
+}
+
+// It may have come since somebody looked, or be there for other machines alone.
+TEST_F(FilesTest, WhatMayNotBeReplacedStays) {
+  const fs::path file = folder_ / "frame";
+  const auto publish = [&](const std::string& text, bool may_replace) {
+    return write_file_verified(file, as_bytes_view(text),
+                               [&](const fs::path&) -> Result<bool> { return may_replace; });
+  };
+  EXPECT_TRUE(publish("one", false).value());
+  EXPECT_FALSE(publish("two", false).value());
+  EXPECT_EQ(read_text_file(file, 100).value(), "one");
+  EXPECT_TRUE(publish("three", true).value());
+  EXPECT_EQ(read_text_file(file, 100).value(), "three");
   EXPECT_EQ(num_files(), 1);
 }
 
@@ -135,10 +154,11 @@ TEST_F(FilesTest, WritersFollowNoLinksThatLieInWait) {
   }
   ASSERT_TRUE(write_file_atomic(target, as_bytes_view("one")));
   ASSERT_TRUE(write_file_unsynced(target, as_bytes_view("two")));
-  ASSERT_TRUE(write_file_verified(target, as_bytes_view("three"), [](const fs::path& temporary) {
-    EXPECT_FALSE(fs::is_symlink(temporary));
-    return Status();
-  }));
+  ASSERT_TRUE(write_file_verified(target, as_bytes_view("three"),
+                                  [](const fs::path& temporary) -> Result<bool> {
+                                    EXPECT_FALSE(fs::is_symlink(temporary));
+                                    return true;
+                                  }));
   EXPECT_EQ(read_text_file(victim, 10).value(), "mine");
   EXPECT_EQ(read_text_file(target, 10).value(), "three");
 
@@ -151,7 +171,9 @@ TEST_F(FilesTest, WritersFollowNoLinksThatLieInWait) {
 }
 
 TEST_F(FilesTest, WhatIsNotPublishedLeavesNothing) {
-  const auto refuse = [](const fs::path&) { return Status(Error{ErrorKind::corrupt, "no"}); };
+  const auto refuse = [](const fs::path&) -> Result<bool> {
+    return Error{ErrorKind::corrupt, "no"};
+  };
   EXPECT_FALSE(write_file_verified(folder_ / "b.txt", as_bytes_view("one"), refuse));
   fs::create_directories(folder_ / "taken" / "inside");
   EXPECT_FALSE(write_file_atomic(folder_ / "taken", as_bytes_view("one")));

@@ -21,14 +21,15 @@ struct FramesTest : ServiceTest {
 
   void SetUp() override {
     ServiceTest::SetUp();
-    options.disk.digest = [this](const fs::path& path) -> Result<Digest> {
+    options.disk.read = [this](const fs::path& path) -> Result<Bytes> {
       if (path.filename() == broken.load())
         return Error{ErrorKind::io, path.string() + ": cannot read: Input/output error"};
       if (path.extension() == ".exr") ++num_read;
-      return digest_of_file(path);
+      return read_whole_file(path);
     };
-    options.disk.picture_writer = [](const fs::path& path) -> std::optional<std::string> {
-      const std::string text = read_text_file(path, 1 << 20).value();
+    options.disk.picture_writer = [](const std::string&,
+                                     const Bytes& bytes) -> std::optional<std::string> {
+      const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
       if (!text.starts_with(kPicture)) return std::nullopt;
       return text.substr(kPicture.size());
     };

@@ -142,9 +142,9 @@ TEST_F(ServiceTest, AFrameThatOnlyItsWorkerSeesCountsAgainstTheWorker) {
 TEST_F(ServiceTest, ABlobThatIsDamagedOrCannotBeReadIsMadeAgainWithoutBlame) {
   enum class Fault { cut, unreadable, other };
   std::string broken;
-  options.disk.digest = [&](const fs::path& path) -> Result<Digest> {
+  options.disk.read = [&](const fs::path& path) -> Result<Bytes> {
     if (path == broken) return Error{ErrorKind::io, broken + ": cannot read: Input/output error"};
-    return digest_of_file(path);
+    return read_whole_file(path);
   };
   for (const Fault fault : {Fault::cut, Fault::unreadable, Fault::other}) {
     SCOPED_TRACE(static_cast<int>(fault));

@@ -18,12 +18,12 @@ using testing::SizeIs;
 /// Reads files only while it is let.
 class SlowDisk {
  public:
-  Result<Digest> digest(const fs::path& path) {
+  Result<Bytes> read(const fs::path& path) {
     std::unique_lock lock(mutex_);
     ++num_begun_;
     changed_.notify_all();
     changed_.wait(lock, [this] { return is_fast_; });
-    return digest_of_file(path);
+    return read_whole_file(path);
   }
   void be(bool fast) {
     const std::lock_guard lock(mutex_);
@@ -54,7 +54,7 @@ struct SlowDiskTest : ServiceTest {
 
   void SetUp() override {
     ServiceTest::SetUp();
-    options.disk.digest = [this](const fs::path& path) { return disk.digest(path); };
+    options.disk.read = [this](const fs::path& path) { return disk.read(path); };
   }
 
   static void sync(FakeWorker& worker) {
@@ -214,7 +214,7 @@ struct FileTableTest : ServiceTest {
   void write(const std::string& text) {
     ASSERT_TRUE(write_file_atomic(file, as_bytes_view(text)).ok());
   }
-  FileContent read() { return {file, *stamp_of(file), *digest_of_file(file), {}}; }
+  FileContent read() { return {file, *stamp_of(file), digest_of(*read_whole_file(file)), {}}; }
 };
 
 TEST_F(FileTableTest, AFileIsReadOnceAndAgainWhenItHasChanged) {
@@ -267,7 +267,7 @@ TEST_F(FileTableTest, AShortRequestDoesNotWaitForALongOne) {
   SlowDisk disk;
   disk.be(false);
   std::atomic<int> num_woken{0};
-  FileReader reader({.digest = [&](const fs::path& path) { return disk.digest(path); }},
+  FileReader reader({.read = [&](const fs::path& path) { return disk.read(path); }},
                     [&] { ++num_woken; });
   const ReadFor longer = Digest{1, 1}, shorter = LeaseId{};
   ASSERT_TRUE(reader.request(longer, std::vector<FileToRead>(5, FileToRead{file})));
@@ -297,16 +297,17 @@ TEST_F(FileTableTest, AShortRequestDoesNotWaitForALongOne) {
 TEST_F(FileTableTest, OnlyWhatHasChangedIsRead) {
   write("bytes");
   std::atomic<int> num_read{0}, num_decoded{0};
-  FileReader reader({.digest =
-                         [&](const fs::path& path) {
-                           ++num_read;
-                           return digest_of_file(path);
-                         },
-                     .picture_writer = [&](const fs::path&) -> std::optional<std::string> {
-                       ++num_decoded;
-                       return "me";
-                     }},
-                    [] {});
+  FileReader reader(
+      {.read =
+           [&](const fs::path& path) {
+             ++num_read;
+             return read_whole_file(path);
+           },
+       .picture_writer = [&](const std::string&, const Bytes&) -> std::optional<std::string> {
+         ++num_decoded;
+         return "me";
+       }},
+      [] {});
   const auto read_one = [&](const FileToRead& wanted) {
     EXPECT_TRUE(reader.request(Digest{1, 1}, {wanted}));
     for (;;) {

@@ -117,13 +117,13 @@ TEST_F(ServiceStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
   const Digest second =
       ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(other).value()}).version;
   worker.do_one_task();
+  worker.say(LeaseRequest{1});
+  worker.expect<NoWork>();
   const JobDetail waiting = show(service.endpoint(), second);
   EXPECT_EQ(waiting.summary.status, JobStatus::running);
   EXPECT_TRUE(waiting.lacks_room);
   EXPECT_THAT(waiting.waits,
               HasSubstr("of the 45 B that --store-limit allows, 30 B of them of jobs"));
-  worker.say(LeaseRequest{1});
-  worker.expect<NoWork>();
   ask<JobList>(service.endpoint(), DeleteJob{first.hex()});
   EXPECT_EQ(worker.expect<LeaseGrant>().lease.job, second);
   EXPECT_FALSE(show(service.endpoint(), second).lacks_room);
