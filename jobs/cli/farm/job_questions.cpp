@@ -10,7 +10,6 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/text.h"
 
 namespace baton {
 namespace {
@@ -51,11 +50,11 @@ struct TasksOptions {
   bool running = false, slow = false, failed = false, json = false;
 };
 
-/// Slower than three of four tasks of its kind and job, and by a half.
+/// It takes half as long again as is usual, and longer by twice the spread, and by a second.
 bool is_slow(const ListedTask& task) {
   const UsualTime& usual = task.usual;
   return !task.has_failed && usual.count >= 3 &&
-         task.seconds > std::max(1.5 * usual.median_s, usual.median_s + 2 * usual.spread_s);
+         task.seconds > usual.median_s + std::max({usual.median_s / 2, 2 * usual.spread_s, 1.0});
 }
 
 std::string task_line(const ListedTask& task) {
@@ -65,7 +64,7 @@ std::string task_line(const ListedTask& task) {
                        task.message);
   return fmt::format("job {}  {:<9}  {}, attempt {}  on {} for {}{}", task.job.short_hex(),
                      is_slow(task) ? "slow" : "running", place, task.task.attempt, task.worker,
-                     duration_text(task.seconds), usual_text(task.usual));
+                     task_time_text(task.seconds), usual_text(task.usual));
 }
 
 ordered_json task_json(const ListedTask& task) {

@@ -9,8 +9,12 @@ namespace baton {
 
 using nlohmann::ordered_json;
 
+std::string task_time_text(double seconds) {
+  return seconds < 10 ? fmt::format("{:.1f}s", seconds) : duration_text(seconds);
+}
+
 std::string usual_text(const UsualTime& usual) {
-  return usual.count == 0 ? "" : fmt::format(" (usual {})", duration_text(usual.median_s));
+  return usual.count == 0 ? "" : fmt::format(" (usual {})", task_time_text(usual.median_s));
 }
 
 void add_usual(const UsualTime& usual, ordered_json& object) {
@@ -26,10 +30,10 @@ std::string worker_lines(const WorkerSummary& worker) {
                                  duration_text(worker.silent_s), worker.renderer, worker.host);
   for (const TaskInHand& task : worker.tasks)
     text += fmt::format("\n  job {}  {}  for {}{}", task.job.short_hex(), place_text(task.task),
-                        duration_text(task.seconds), usual_text(task.usual));
+                        task_time_text(task.seconds), usual_text(task.usual));
   for (const BlindSpot& blind : worker.blind)
     text += fmt::format("\n  job {}  gets none of its tasks: does not see {}",
-                        blind.job.short_hex(), blind.folder);
+                        blind.job.short_hex(), blind.folder.substr(0, blind.folder.find(": ")));
   return text;
 }
 
@@ -79,7 +83,7 @@ ordered_json lost_json(const LostWorker& worker) {
 std::string reason_line(const Reason& reason) {
   std::string text = reason.text;
   if (reason.seconds > 0)
-    text += fmt::format(" for {}{}", duration_text(reason.seconds), usual_text(reason.usual));
+    text += fmt::format(" for {}{}", task_time_text(reason.seconds), usual_text(reason.usual));
   if (reason.since_ms > 0) text += fmt::format(", since {}", utc_text(reason.since_ms));
   return text;
 }

@@ -15,6 +15,8 @@ nlohmann::ordered_json worker_json(const WorkerSummary& worker);
 std::string lost_line(const LostWorker& worker);
 nlohmann::ordered_json lost_json(const LostWorker& worker);
 
+/// "0.3s", "41s", "3m05s".
+std::string task_time_text(double seconds);
 /// " (usual 38s)"; empty: nothing is known.
 std::string usual_text(const UsualTime& usual);
 /// Adds the median, its spread and the number of tasks to an object; nothing where none is known.
