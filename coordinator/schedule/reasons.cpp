@@ -390,6 +390,7 @@ std::string waits_for(const Scheduler& scheduler, const Digest& digest, TimePoin
         job.renderer, leases.renderer_of(leases.connected().front()));
   }
   if (lacks_room(scheduler, digest)) return room_text(scheduler, job);
+  if (leases.connected().empty()) return {};
   const Crew crew = job.crew(leases, now);
   if (const std::string unseen = job.standings.unseen(); !unseen.empty() && are_all_blind(crew))
     return fmt::format("a worker that sees {}", unseen);

@@ -107,6 +107,8 @@ TEST(Reasons, ABlindWorkerIsNamedWhileItIsThere) {
   EXPECT_EQ(chain[0].text, "does not see /shows");
 
   farm.step(WorkerLeft{"x"});
+  farm.step(LeaseReturned{"y", farm.ask_one("y").lease, "/films"});
+  EXPECT_EQ(waits_for(farm.scheduler, farm.job, farm.now), "a worker that sees /films");
   farm.step(WorkerLeft{"y"});
   EXPECT_EQ(waits_for(farm.scheduler, farm.job, farm.now), "") << "nobody is there to be blamed";
   EXPECT_THAT(kinds(farm.why()), ElementsAre(ReasonKind::input, ReasonKind::no_worker));
