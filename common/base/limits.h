@@ -95,6 +95,7 @@ inline constexpr int kMaxTaskAttempts = 16;
 inline constexpr int kMaxTaskLosses = 16;  ///< lost leases of a task that pause its job
 inline constexpr int kMaxSecondsPerTask = 30 * 24 * 3600;
 inline constexpr int kMaxLeasesPerWorker = 1024;
+inline constexpr int kMaxPriority = 100;  ///< of a job
 inline constexpr int kMaxJobs = 10000;
 inline constexpr int kMaxWorkers = 4096;
 inline constexpr std::size_t kMaxCachedJobs = 4;            ///< loaded scenes a worker keeps

@@ -37,9 +37,10 @@ enum class FarmEventKind : std::uint8_t {
   worker_drained = 20,
   frames_locked = 21,
   frames_unlocked = 22,
+  priority_changed = 23,
 };
-constexpr FarmEventKind last_of(FarmEventKind) { return FarmEventKind::frames_unlocked; }
-/// "coordinator started" ... "frames unlocked".
+constexpr FarmEventKind last_of(FarmEventKind) { return FarmEventKind::priority_changed; }
+/// "coordinator started" ... "priority changed".
 std::string_view farm_event_name(FarmEventKind kind);
 
 /// A task as people see it: which frames, which tile.
@@ -79,6 +80,10 @@ struct EventQuery {
   std::int64_t since_ms = 0;        ///< at this time or later
   std::int32_t count = 1000;        ///< at most so many
   bool is_newest = true;            ///< the newest of them; else the oldest
+  std::uint64_t kinds = 0;          ///< a bit for each kind; 0: all
 };
+constexpr std::uint64_t bit_of(FarmEventKind kind) {
+  return std::uint64_t{1} << static_cast<unsigned>(kind);
+}
 
 }  // namespace baton

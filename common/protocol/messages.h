@@ -8,6 +8,7 @@
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
 #include "common/base/result.h"
+#include "common/job/activity.h"
 #include "common/job/farm_event.h"
 #include "common/job/job_id.h"
 #include "common/job/task.h"
@@ -19,7 +20,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 14;
+inline constexpr std::uint16_t kProtocolVersion = 15;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.
@@ -153,6 +154,24 @@ struct LockFrames {
   std::vector<FrameNumber> frames;  ///< ascending
   bool off = false;
 };
+/// The job comes before those of lower priority; its documents stay as they are.
+struct SetPriority {
+  std::string job;
+  std::int32_t priority = 50;  ///< [0, 100]
+};
+/// Why a job, or a frame or tile of it, is not done, or why a worker does what it does.
+struct AskWhy {
+  std::string job;     ///< as of ShowJob; empty: of the worker
+  std::string worker;  ///< as listed
+  bool has_frame = false;
+  FrameNumber frame{};
+  std::int32_t tile = -1;  ///< of the frame; -1: the whole frame
+};
+/// The tasks that workers have now, and those that were failed. job: as of ShowJob; empty: of all
+/// jobs that have not ended.
+struct ListTasks {
+  std::string job;
+};
 /// What has happened. job: as of ShowJob; empty: of all.
 struct ListEvents {
   std::string job;
@@ -178,12 +197,19 @@ struct JobSummary {
 struct ListedJob {
   JobIdentity identity;
   JobSummary summary;
+  JobNow now = {};
 };
 /// A task that a worker has.
 struct TaskInHand {
   JobId job;
   TaskPlace task;
   double seconds = 0;  ///< since it was granted
+  UsualTime usual = {};
+};
+/// A folder that a worker does not see, and so gets no tasks of the job.
+struct BlindSpot {
+  JobId job;
+  std::string folder;
 };
 struct WorkerSummary {
   std::string worker_id, host;
@@ -191,6 +217,17 @@ struct WorkerSummary {
   std::vector<TaskInHand> tasks = {};  ///< those that it has had for longest first
   /// It was told to finish and to take nothing new.
   bool is_draining = false;
+  WorkerActivity activity = WorkerActivity::idle;
+  double silent_s = 0;  ///< since its last sign of life
+  std::string build = {}, renderer = {};
+  std::vector<BlindSpot> blind = {};
+};
+/// A worker that was lost, and has not come again.
+struct LostWorker {
+  std::string worker_id;
+  std::string about;           ///< what was told when it joined
+  std::int64_t joined_ms = 0;  ///< since 1970, UTC; 0: not known
+  std::int64_t lost_ms = 0;
 };
 struct JobAccepted {
   JobIdentity identity;
@@ -208,6 +245,7 @@ struct JobList {
   std::uint64_t tasks_ready = 0;
   /// CPU time of the longest recent tasks of these jobs; 0: not known.
   double task_seconds = 0;
+  std::vector<LostWorker> lost = {};  ///< in the last day, the newest first
 };
 struct JobDetail {
   JobSummary summary;
@@ -230,6 +268,25 @@ struct ShownJob {
   std::vector<std::string> growth = {};
   /// Frames that count as done, whatever is in their files; ascending.
   std::vector<FrameNumber> locked = {};
+  JobNow now = {};
+};
+/// From what was asked for to its last causes; never empty.
+struct ReasonChain {
+  std::vector<Reason> reasons;
+};
+/// A task that a worker has, or an attempt that has failed.
+struct ListedTask {
+  JobId job;
+  bool has_task = false;  ///< else the job has no such task any more
+  TaskPlace task;
+  std::string worker;
+  bool has_failed = false;
+  double seconds = 0;        ///< of a task in hand: since it was granted
+  UsualTime usual = {};      ///< of a task in hand
+  std::string message = {};  ///< of one that has failed
+};
+struct TaskList {
+  std::vector<ListedTask> tasks;
 };
 /// Events of a kind that are forgotten.
 struct ForgottenEvents {
@@ -253,7 +310,8 @@ using Message =
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
                  JobAccepted, JobList, ShownJob, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
                  ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates, BlobsLeft,
-                 ListEvents, EventList, LockFrames>;
+                 ListEvents, EventList, LockFrames, SetPriority, AskWhy, ReasonChain, ListTasks,
+                 TaskList>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

@@ -34,6 +34,29 @@ Status read_enum(const SqlDatabase& database, std::int64_t number, const char* c
   return {};
 }
 
+/// Columns: kind, step, tile, outputs, stats, frames.
+Result<Completion> read_completion(const SqlDatabase& database, const SqlStatement& row) {
+  Completion completion;
+  BATON_TRY(read_enum(database, row.integer(0), "completions.kind", completion.task.kind));
+  completion.task.position = static_cast<std::int32_t>(row.integer(1));
+  completion.task.tile = static_cast<std::int32_t>(row.integer(2));
+  BATON_TRY(read_blob(database, row.blob(3), "completions.outputs", completion.made.outputs));
+  BATON_TRY(read_blob(database, row.blob(4), "completions.stats", completion.made.stats));
+  BATON_TRY(read_blob(database, row.blob(5), "completions.frames", completion.made.frames));
+  return completion;
+}
+
+/// Columns: lease, worker, message, permanent.
+Result<Failure> read_failure(const SqlDatabase& database, const SqlStatement& row) {
+  Failure failure;
+  BATON_TRY(read_blob(database, row.blob(0), "failures.lease", failure.lease));
+  failure.worker = row.text(1);
+  failure.message = row.text(2);
+  failure.permanent = (row.integer(3) & 1) != 0;
+  failure.last = (row.integer(3) & 2) != 0;
+  return failure;
+}
+
 }  // namespace
 
 // ---- opening ------------------------------------------------------------------------------------
@@ -115,7 +138,7 @@ Status Journal::visit_recorded(const Digest& job,
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return {};
-    BATON_ASSIGN(const Completion completion, read_completion(query));
+    BATON_ASSIGN(const Completion completion, read_completion(database_, query));
     BATON_TRY(visit(completion));
   }
 }
@@ -199,7 +222,7 @@ Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int cou
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return failures;
-    BATON_ASSIGN(Failure failure, read_failure(query));
+    BATON_ASSIGN(Failure failure, read_failure(database_, query));
     failures.push_back(std::move(failure));
   }
 }
@@ -238,29 +261,6 @@ Result<std::set<Digest>> Journal::output_marks() {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT job FROM output_marks"));
   BATON_ASSIGN(const std::vector<Digest> jobs, read_digests(query));
   return std::set<Digest>(jobs.begin(), jobs.end());
-}
-
-/// Columns: kind, step, tile, outputs, stats, frames.
-Result<Completion> Journal::read_completion(const SqlStatement& row) const {
-  Completion completion;
-  BATON_TRY(read_enum(database_, row.integer(0), "completions.kind", completion.task.kind));
-  completion.task.position = static_cast<std::int32_t>(row.integer(1));
-  completion.task.tile = static_cast<std::int32_t>(row.integer(2));
-  BATON_TRY(read_blob(database_, row.blob(3), "completions.outputs", completion.made.outputs));
-  BATON_TRY(read_blob(database_, row.blob(4), "completions.stats", completion.made.stats));
-  BATON_TRY(read_blob(database_, row.blob(5), "completions.frames", completion.made.frames));
-  return completion;
-}
-
-/// Columns: lease, worker, message, permanent.
-Result<Failure> Journal::read_failure(const SqlStatement& row) const {
-  Failure failure;
-  BATON_TRY(read_blob(database_, row.blob(0), "failures.lease", failure.lease));
-  failure.worker = row.text(1);
-  failure.message = row.text(2);
-  failure.permanent = (row.integer(3) & 1) != 0;
-  failure.last = (row.integer(3) & 2) != 0;
-  return failure;
 }
 
 // ---- writing ------------------------------------------------------------------------------------
@@ -305,6 +305,7 @@ Status Journal::delete_job(const Digest& job) {
         "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   BATON_TRY(change("DELETE FROM growth WHERE id NOT IN (SELECT id FROM versions)"));
+  BATON_TRY(change("DELETE FROM priorities WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM locked_frames WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM pictures_given_up WHERE id NOT IN (SELECT id FROM versions)"));
   return change("DELETE FROM identities WHERE id NOT IN (SELECT id FROM versions)");

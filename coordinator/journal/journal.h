@@ -58,6 +58,12 @@ struct JobGrowth {
   std::vector<std::string> said = {};
 };
 
+/// A priority that a person has set: it stands in for the one that a job's document says, as long
+/// as that says `written`.
+struct PriorityChange {
+  std::int32_t written = 0, wanted = 0;
+};
+
 /// By what a job is found.
 struct JobIndex {
   std::string name;
@@ -171,6 +177,9 @@ class Journal {
   /// Frames that count as done whatever is in their files.
   Result<std::map<JobId, std::set<FrameNumber>>> locked_frames();
   Status record_lock(const JobId& id, FrameNumber frame, bool is_locked);
+  /// Of the jobs of which somebody has set it.
+  Result<std::map<JobId, PriorityChange>> priorities();
+  Status record_priority(const JobId& id, const PriorityChange& priority);
   /// Pictures in the places of a job's frames, by name in its folder, that a person has given up,
   /// and that are not replaced yet.
   Result<std::map<std::string, Digest>> given_up(const JobId& id);
@@ -200,8 +209,6 @@ class Journal {
   explicit Journal(SqlDatabase database) : database_(std::move(database)) {}
   Status prepare_schema();
   Status count_start();
-  Result<Failure> read_failure(const SqlStatement& row) const;
-  Result<Completion> read_completion(const SqlStatement& row) const;
   Status visit_recorded(const Digest& job, const std::function<Status(const Completion&)>& visit);
   Status visit_archived(const Digest& job, const std::function<Status(const Completion&)>& visit);
   Result<std::vector<Digest>> read_digests(SqlStatement& query) const;

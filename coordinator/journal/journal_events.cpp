@@ -79,6 +79,23 @@ Status Journal::record_lock(const JobId& id, FrameNumber frame, bool is_locked) 
                 id.hex(), std::int64_t{frame.value()});
 }
 
+Result<std::map<JobId, PriorityChange>> Journal::priorities() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT id, written, wanted FROM priorities"));
+  std::map<JobId, PriorityChange> priorities;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return priorities;
+    if (const std::optional<JobId> id = JobId::from_hex(query.text(0)))
+      priorities[*id] = {static_cast<std::int32_t>(query.integer(1)),
+                         static_cast<std::int32_t>(query.integer(2))};
+  }
+}
+
+Status Journal::record_priority(const JobId& id, const PriorityChange& priority) {
+  return change("INSERT OR REPLACE INTO priorities (id, written, wanted) VALUES (?, ?, ?)",
+                id.hex(), std::int64_t{priority.written}, std::int64_t{priority.wanted});
+}
+
 Result<std::map<std::string, Digest>> Journal::given_up(const JobId& id) {
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT file, digest FROM pictures_given_up WHERE id = ?"));
@@ -145,13 +162,14 @@ Result<std::vector<FarmEvent>> Journal::events(const EventQuery& wanted) {
   const std::string order = wanted.is_newest ? "DESC" : "ASC";
   BATON_ASSIGN(SqlStatement query,
                database_.prepare(fmt::format(
-                   "SELECT * FROM ({} {} AND sequence > ?2 AND time_ms >= ?3 ORDER BY sequence {} "
-                   "LIMIT ?4) ORDER BY sequence",
+                   "SELECT * FROM ({} {} AND sequence > ?2 AND time_ms >= ?3 AND "
+                   "(?5 = 0 OR (?5 >> kind) & 1) ORDER BY sequence {} LIMIT ?4) ORDER BY sequence",
                    columns, of_job, order)));
   query.bind(wanted.job.hex())
       .bind(wanted.after_sequence)
       .bind(wanted.since_ms)
-      .bind(std::int64_t{wanted.count});
+      .bind(std::int64_t{wanted.count})
+      .bind(static_cast<std::int64_t>(wanted.kinds));
   std::vector<FarmEvent> events;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());

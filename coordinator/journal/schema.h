@@ -75,8 +75,9 @@ inline constexpr const char* kSchema = R"sql(
 /// `renderers`: by what the tasks of a job were done that are done, the last ones of `mixed_jobs`.
 /// Where other tables say `job`, they mean the digest of a document: a version. `versions` says of
 /// which job (JobId) it is the n-th, `identities` when what happened to that job, `locked_frames`
-/// which of its frames count as done whatever is in their files, `growth` how it has come by its
-/// sweeps. `pictures_given_up` are those that a job may replace though no job has written them;
+/// which of its frames count as done whatever is in their files, `priorities` which priority a
+/// person has set in place of the one that is written in its document, `growth` how it has come by
+/// its sweeps. `pictures_given_up` are those that a job may replace though no job has written them;
 /// `marked_folders` what output folders were, without links, when a job marked them.
 /// `events` is appended to alone (FarmEvent), without an index, which would cost more than it
 /// saves; its last row stays, so that no number is given twice. Of those that are old, `event_sums`
@@ -104,6 +105,8 @@ inline constexpr const char* kLaterTables = R"sql(
   CREATE TABLE IF NOT EXISTS event_sums (
     job TEXT NOT NULL, kind INTEGER NOT NULL, count INTEGER NOT NULL, seconds REAL NOT NULL,
     PRIMARY KEY (job, kind)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS priorities (
+    id TEXT PRIMARY KEY, written INTEGER NOT NULL, wanted INTEGER NOT NULL) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS locked_frames (
     id TEXT NOT NULL, frame INTEGER NOT NULL, PRIMARY KEY (id, frame)) WITHOUT ROWID;
   DROP TABLE IF EXISTS given_up;

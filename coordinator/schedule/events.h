@@ -127,6 +127,11 @@ struct FramesLocked {
   Digest job;
   std::vector<FrameIndex> frames;
 };
+/// The job comes before those of lower priority from now on; what is leased goes on.
+struct PriorityChanged {
+  Digest job;
+  int priority = 0;
+};
 /// A job that has ended is forgotten; nobody here needs its blobs any more.
 struct JobForgotten {
   Digest job;
@@ -211,11 +216,11 @@ struct StoreKeeps {
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event =
-    std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, FramesInspected,
-                 FramesLocked, JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested,
-                 TaskCompleted, AttemptFailed, ResultMissing, SpaceLacking, InputsLost,
-                 LeaseReturned, PlaceTaken, HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
+using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
+                           FramesInspected, FramesLocked, JobForgotten, PriorityChanged,
+                           WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
+                           AttemptFailed, ResultMissing, SpaceLacking, InputsLost, LeaseReturned,
+                           PlaceTaken, HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed

@@ -45,6 +45,10 @@ class LeaseBook {
   bool nobody_renders_as(const std::string& renderer) const;
   /// Notes a sign of life. False: the worker is not known.
   bool touch(const std::string& worker, TimePoint now);
+  /// How long a worker, which is known, has said nothing.
+  std::chrono::duration<double> silence_of(const std::string& worker, TimePoint now) const {
+    return now - workers_.at(worker).last_sign;
+  }
   /// Forgets a worker, which has no leases.
   void leave(const std::string& worker);
   bool knows(const std::string& worker) const { return workers_.contains(worker); }

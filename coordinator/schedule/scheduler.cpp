@@ -46,6 +46,32 @@ std::vector<Digest> Scheduler::jobs() const {
   return result;
 }
 
+std::vector<Digest> Scheduler::in_turn() const {
+  std::vector<Digest> result;
+  for (const auto& [rank, digest] : running_) result.push_back(digest);
+  return result;
+}
+
+TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt) {
+  const Timeline& timeline = job.tasks.graph().timeline();
+  const auto number = [&](FrameIndex frame) { return job.spec.frames[frame.index()]; };
+  TaskPlace place{.kind = task.kind, .tile = task.tile, .attempt = attempt};
+  switch (task.kind) {
+    case TaskKind::assemble:
+      place.first = place.last = number(task.frame());
+      break;
+    case TaskKind::second_pass:
+      place.first = place.last = number(timeline.frame_of(task.step()));
+      break;
+    case TaskKind::render:
+      const StepSpan steps = timeline.steps_of(task.run());
+      place.first = number(timeline.frame_of(steps.first));
+      place.last = number(timeline.frame_of(steps.last));
+      break;
+  }
+  return place;
+}
+
 // ---- events: jobs -------------------------------------------------------------------------------
 
 void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
@@ -151,6 +177,14 @@ void Scheduler::on(const FramesLocked& event, TimePoint, Actions& actions) {
   end_if_finished(event.job, *job, actions);
 }
 
+void Scheduler::on(const PriorityChanged& event, TimePoint, Actions&) {
+  Job* job = find(event.job);
+  if (!job) return;
+  const bool runs = running_.erase(job->rank()) > 0;
+  job->spec.priority = event.priority;
+  if (runs) running_.emplace(job->rank(), event.job);
+}
+
 void Scheduler::on(const JobForgotten& event, TimePoint, Actions&) {
   Job* job = find(event.job);
   if (!job || is_open(job->status)) return;
@@ -231,7 +265,7 @@ bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<Bl
   actions.push_back(ReportConflict{event.lease, event.worker, maker, *e, *r});
   if (job.status != JobStatus::running) return false;
   job.waits = fmt::format("somebody to look: workers {} and {} have made different bytes of {}",
-                          maker, event.worker, describe_task(event.lease.task));
+                          maker, event.worker, place_text(place_of(job, event.lease.task)));
   pause_job(digest, job, job.waits, actions);
   return false;
 }
@@ -406,7 +440,8 @@ void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const st
   for (const TaskIndex hopeless : job.tasks.give_up(task)) revoke_lease(digest, hopeless, actions);
   if (job.tasks.book().counts().failed >= static_cast<std::uint64_t>(job.spec.max_failed_tasks)) {
     end_job(digest, job, JobStatus::failed,
-            fmt::format("{} failed: {}", describe_task(job.tasks.graph().key(task)), reason),
+            fmt::format("{} failed: {}", place_text(place_of(job, job.tasks.graph().key(task))),
+                        reason),
             actions);
   } else {
     end_if_finished(digest, job, actions);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/job/farm_event.h"
 #include "coordinator/schedule/blob_sizes.h"
 #include "coordinator/schedule/events.h"
 #include "coordinator/schedule/job_tasks.h"
@@ -100,16 +101,19 @@ class Scheduler {
   std::size_t num_jobs() const { return jobs_.size(); }
   /// All jobs, in the order of submission.
   std::vector<Digest> jobs() const;
+  /// Those that run, in the order in which workers are offered their tasks.
+  std::vector<Digest> in_turn() const;
   /// Whether the job, which must be known, waits for somebody who renders as it was begun.
   bool lacks_renderer(const Digest& job) const {
     return !rules_.may_take_over && leases_.nobody_renders_as(jobs_.at(job).renderer);
   }
-  /// What the job, which must be known, cannot go on without; empty: it goes on, or has ended. Of a
-  /// job that failed although its tasks are done, what somebody must decide.
-  std::string waits_for(const Digest& job, TimePoint now) const;
-  /// Whether the store has no room for the job's next task, and nothing in work will make some. The
-  /// job must be known.
-  bool lacks_room(const Digest& job) const;
+  /// What the store may hold and holds.
+  StoreRoom room() const;
+  /// Whether a ready task of the job may be granted (store_room.h). others_wait: a job before this
+  /// one waits for room.
+  bool has_room_for(const Job& job, TaskIndex task, bool others_wait) const;
+  /// What jobs that have ended leave in the store.
+  std::uint64_t kept_bytes() const { return kept_bytes_; }
   /// What blobs take that somebody needs: jobs, and those that have ended (StoreKeeps).
   std::uint64_t store_bytes() const { return blobs_.size_bytes() + kept_bytes_; }
   /// Who is connected and has which lease.
@@ -136,6 +140,7 @@ class Scheduler {
   void on(const FramesInspected& event, TimePoint now, Actions& actions);
   void on(const FramesLocked& event, TimePoint now, Actions& actions);
   void on(const JobForgotten& event, TimePoint now, Actions& actions);
+  void on(const PriorityChanged& event, TimePoint now, Actions& actions);
   void on(const WorkerJoined& event, TimePoint now, Actions& actions);
   void on(const WorkerAlive& event, TimePoint now, Actions& actions);
   void on(const WorkerLeft& event, TimePoint now, Actions& actions);
@@ -170,11 +175,6 @@ class Scheduler {
   void ask_for_states(const std::string& worker, TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
 
-  // Room in the store (scheduler_room.cpp).
-  StoreRoom room() const;
-  bool has_room_for(const Job& job, TaskIndex task, bool others_wait) const;
-  std::string lacking_room(const Job& job) const;
-
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);
   void replay(Job& job, const JobAdded& event, Actions& actions);
@@ -202,5 +202,11 @@ class Scheduler {
   BlobReferences blobs_;
   std::uint64_t kept_bytes_ = 0;  ///< what ended jobs leave
 };
+
+/// A task of a job as people see it.
+TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt = 0);
+/// What decides the bytes of the job's tasks: the renderer of what is done or, where nothing is, of
+/// what is being done; empty: anybody may begin.
+std::string renderer_of(const Digest& digest, const Scheduler::Job& job, const LeaseBook& leases);
 
 }  // namespace baton

@@ -18,15 +18,13 @@ StepSpan steps_to_render(const JobTasks& tasks, TaskIndex task) {
   return tasks.ledger().is_cut(task) ? StepSpan{steps.last + 1, steps.last} : steps;
 }
 
-/// What decides the bytes of the job's tasks: the renderer of what is done or, where nothing is, of
-/// what is being done; empty: anybody may begin.
+}  // namespace
+
 std::string renderer_of(const Digest& digest, const Scheduler::Job& job, const LeaseBook& leases) {
   if (!job.renderer.empty()) return job.renderer;
   const Lease* const begun = leases.any_of(digest);
   return begun == nullptr ? std::string() : leases.renderer_of(begun->worker);
 }
-
-}  // namespace
 
 // ---- events: workers ----------------------------------------------------------------------------
 
@@ -168,7 +166,7 @@ bool Scheduler::count_loss(const Digest& digest, Job& job, TaskIndex task, Actio
   const std::int32_t losses = job.tasks.attempts().add_loss(task);
   if (losses < limits::kMaxTaskLosses || job.status != JobStatus::running) return true;
   job.waits = fmt::format("somebody to look at {}: its workers or results were lost {} times",
-                          describe_task(job.tasks.graph().key(task)), losses);
+                          place_text(place_of(job, job.tasks.graph().key(task))), losses);
   pause_job(digest, job, job.waits, actions);
   return false;
 }
@@ -187,7 +185,10 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
     }
   }
   leases_.leave(worker);
-  for (auto& [digest, job] : jobs_) job.homes.leave(worker);
+  for (auto& [digest, job] : jobs_) {
+    job.homes.leave(worker);
+    job.standings.forget(worker);
+  }
   lose_held(worker, actions);
 }
 
@@ -317,29 +318,6 @@ bool Scheduler::Job::is_due(TaskIndex task, const std::string& worker, const Cre
   const TaskKind kind = tasks.graph().key(task).kind;
   return rests_until.at(static_cast<std::size_t>(kind)) <= workers.now &&
          may_try(workers, tasks.attempts().blame(task), worker);
-}
-
-std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
-  const Job& job = jobs_.at(digest);
-  if (!is_open(job.status) || !job.waits.empty()) return job.waits;
-  if (lacks_renderer(digest)) {
-    return fmt::format(
-        "a worker that renders as what is done was rendered, with {}: those that are connected "
-        "render with {}, and pixels may differ. --restart renders all frames again, --from-frame N "
-        "those from N on; `baton-worker --isa` makes unlike machines alike",
-        job.renderer, leases_.renderer_of(leases_.connected().front()));
-  }
-  if (lacks_room(digest)) return lacking_room(job);
-  const Crew crew = job.crew(leases_, now);
-  if (const std::string unseen = job.standings.unseen(); !unseen.empty() && are_all_blind(crew))
-    return fmt::format("a worker that sees {}", unseen);
-  for (const TaskIndex task : job.tasks.attempts().tried()) {
-    if (job.tasks.book().status(task) != TaskStatus::ready) continue;
-    if (!somebody_may_try(crew, job.tasks.attempts().blame(task)))
-      return fmt::format("a worker that can do {}: those that are connected have failed it or rest",
-                         describe_task(job.tasks.graph().key(task)));
-  }
-  return {};
 }
 
 }  // namespace baton

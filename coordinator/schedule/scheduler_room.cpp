@@ -1,8 +1,3 @@
-#include <fmt/format.h>
-
-#include <algorithm>
-
-#include "common/base/size_text.h"
 #include "coordinator/schedule/scheduler.h"
 
 namespace baton {
@@ -25,7 +20,6 @@ StoreRoom Scheduler::room() const {
   return {rules_.store_limit, store_bytes(), leases_.expected_bytes(), leases_.empty()};
 }
 
-/// Whether a ready task of the job may be granted (store_room.h).
 bool Scheduler::has_room_for(const Job& job, TaskIndex task, bool others_wait) const {
   if (rules_.store_limit == 0) return true;
   std::vector<JobInStore> others;
@@ -33,29 +27,6 @@ bool Scheduler::has_room_for(const Job& job, TaskIndex task, bool others_wait) c
     if (&other != &job && is_open(other.status)) others.push_back(other.in_store());
   }
   return has_room(room(), job.in_store(), others, task, others_wait);
-}
-
-bool Scheduler::lacks_room(const Digest& digest) const {
-  const Job& job = jobs_.at(digest);
-  if (job.status != JobStatus::running || !leases_.empty() || job.tasks.book().ready().empty())
-    return false;
-  // Assembly makes room; its tasks come first.
-  for (const auto& [rank, other] : running_) {
-    const JobTasks& tasks = jobs_.at(other).tasks;
-    if (!tasks.book().ready().empty() && *tasks.book().ready().begin() < tasks.graph().num_frames())
-      return false;
-  }
-  return !has_room_for(job, *job.tasks.book().ready().begin(), false);
-}
-
-/// What a job that lacks room waits for.
-std::string Scheduler::lacking_room(const Job& job) const {
-  const JobGraph& graph = job.tasks.graph();
-  return fmt::format(
-      "room in the store: it holds {} of the {} that --store-limit allows, {} of them of jobs that "
-      "have ended, and the next task needs about {}: raise the limit, or delete ended jobs",
-      bytes_text(store_bytes()), bytes_text(rules_.store_limit), bytes_text(kept_bytes_),
-      bytes_text(job.sizes.largest(graph, graph.key(*job.tasks.book().ready().begin()))));
 }
 
 }  // namespace baton

@@ -21,6 +21,11 @@ bool Standings::has_failed_much(const std::string& worker, TimePoint now) const 
   return found != failed_.end() && now < found->second.rests_until;
 }
 
+std::string Standings::unseen_by(const std::string& worker) const {
+  const auto found = blind_.find(worker);
+  return found == blind_.end() ? std::string() : found->second.unseen;
+}
+
 bool Standings::is_blind(const std::string& worker, TimePoint now) const {
   const auto found = blind_.find(worker);
   return found != blind_.end() && now < found->second.until;

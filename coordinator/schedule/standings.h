@@ -29,6 +29,8 @@ class Standings {
   bool is_blind(const std::string& worker, TimePoint now) const;
   /// A folder that some worker did not see; empty: none said so.
   std::string unseen() const { return blind_.empty() ? "" : blind_.begin()->second.unseen; }
+  /// The one that this worker did not see; empty: it said nothing.
+  std::string unseen_by(const std::string& worker) const;
 
  private:
   struct Failed {

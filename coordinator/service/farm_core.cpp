@@ -195,7 +195,9 @@ Status FarmCore::perform(const RecordOutputs& action) {
 
 Status FarmCore::perform(const RecordFailure& action) {
   const Failure& failure = action.failure;
-  spdlog::warn("job {}: attempt {} on {} failed: {}", history.name_of(failure.lease.job),
+  const Scheduler::Job* const job = scheduler.find_job(failure.lease.job);
+  spdlog::warn("job {}: {}, attempt {} on {} failed: {}", history.name_of(failure.lease.job),
+               job ? place_text(place_of(*job, failure.lease.task)) : "a task",
                failure.lease.attempt, failure.worker, failure.message);
   return journal.record_failure(failure);
 }

@@ -33,28 +33,10 @@ FarmEventKind kind_of(LeaseEnd end) {
 
 }  // namespace
 
-TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt) {
-  const Timeline& timeline = job.tasks.graph().timeline();
-  const auto number = [&](FrameIndex frame) { return job.spec.frames[frame.index()]; };
-  TaskPlace place{.kind = task.kind, .tile = task.tile, .attempt = attempt};
-  switch (task.kind) {
-    case TaskKind::assemble:
-      place.first = place.last = number(task.frame());
-      break;
-    case TaskKind::second_pass:
-      place.first = place.last = number(timeline.frame_of(task.step()));
-      break;
-    case TaskKind::render:
-      const StepSpan steps = timeline.steps_of(task.run());
-      place.first = number(timeline.frame_of(steps.first));
-      place.last = number(timeline.frame_of(steps.last));
-      break;
-  }
-  return place;
-}
-
 Status History::read() {
   BATON_ASSIGN(jobs_, IdentityBook::read(journal_));
+  BATON_TRY(remember(RecentPast::kinds()));
+  BATON_TRY(remember(bit_of(FarmEventKind::task_done)));
   BATON_ASSIGN(const std::vector<FarmEvent> begun, journal_.events_without_end());
   for (FarmEvent event : begun) {
     const bool is_task = event.kind == FarmEventKind::task_granted;
@@ -63,6 +45,13 @@ Status History::read() {
     event.seconds = is_task ? static_cast<double>(now_ms() - event.time_ms) / 1000 : 0;
     BATON_TRY(tell(std::move(event)));
   }
+  return {};
+}
+
+Status History::remember(std::uint64_t kinds) {
+  BATON_ASSIGN(const std::vector<FarmEvent> events,
+               journal_.events({.count = limits::kMaxEventsTold, .kinds = kinds}));
+  for (const FarmEvent& event : events) past_.add(event);
   return {};
 }
 
@@ -75,6 +64,7 @@ Status History::tell(FarmEvent event) {
   event.time_ms = now_ms();
   event.actor = actor_;
   event.reason.resize(std::min<std::size_t>(event.reason.size(), limits::kMaxTextLength));
+  past_.add(event);
   return journal_.record_event(event);
 }
 
@@ -117,6 +107,22 @@ Status History::locked(const Digest& version, const std::vector<FrameNumber>& fr
   return tell({.kind = is_locked ? FarmEventKind::frames_locked : FarmEventKind::frames_unlocked,
                .job = job,
                .reason = "frames " + format_frames(frames)});
+}
+
+Status History::prioritized(const Digest& version, std::int32_t before,
+                            const PriorityChange& priority) {
+  const JobId job = jobs_.of(version).id;
+  BATON_TRY(jobs_.set_priority(journal_, job, priority));
+  return tell({.kind = FarmEventKind::priority_changed,
+               .job = job,
+               .reason = fmt::format("{}, it was {}", priority.wanted, before)});
+}
+
+Result<std::int32_t> History::priority_of(const Digest& version, std::int32_t written) {
+  const JobId job = jobs_.of(version).id;
+  const std::int32_t priority = jobs_.priority(job, written);
+  if (priority == written) BATON_TRY(jobs_.set_priority(journal_, job, {written, written}));
+  return priority;
 }
 
 Status History::granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker,

@@ -5,11 +5,9 @@
 #include "coordinator/journal/journal.h"
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/service/identity_book.h"
+#include "coordinator/service/recent_past.h"
 
 namespace baton {
-
-/// A task of a job as people see it.
-TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt = 0);
 
 /// Tells the journal what happens, once, in the transaction of what it tells. Jobs are named by the
 /// digest of a version; one that is a version of no job is told of without a name.
@@ -25,6 +23,7 @@ class History {
   /// or somebody without a key.
   void set_actor(std::string actor) { actor_ = std::move(actor); }
   const IdentityBook& jobs() const { return jobs_; }
+  const RecentPast& past() const { return past_; }
   /// Short, for people: the ID of the job, or the beginning of the digest where it has none.
   std::string name_of(const Digest& version) const;
 
@@ -34,6 +33,11 @@ class History {
   Status deleted(const Digest& version);
   /// Frames of the job count as done from now on, or no longer.
   Status locked(const Digest& version, const std::vector<FrameNumber>& frames, bool is_locked);
+  /// The job has another priority from now on. before: the one it had; written: in its document.
+  Status prioritized(const Digest& version, std::int32_t before, const PriorityChange& priority);
+  /// The priority of a job whose document, which was submitted now, says `written`: one that was
+  /// set before counts while documents say what they said then.
+  Result<std::int32_t> priority_of(const Digest& version, std::int32_t written);
   Status granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker,
                  const std::string& reason = {});
   /// job: null: it is forgotten.
@@ -47,9 +51,11 @@ class History {
 
  private:
   Status tell(FarmEvent event);
+  Status remember(std::uint64_t kinds);
 
   Journal& journal_;
   IdentityBook jobs_;
+  RecentPast past_;
   std::string actor_;
 };
 

@@ -19,6 +19,11 @@ Result<IdentityBook> IdentityBook::read(Journal& journal) {
     const auto job = book.jobs_.find(id);
     if (job != book.jobs_.end()) job->second.locked = frames;
   }
+  BATON_ASSIGN(const auto priorities, journal.priorities());
+  for (const auto& [id, priority] : priorities) {
+    const auto job = book.jobs_.find(id);
+    if (job != book.jobs_.end()) job->second.priority = priority;
+  }
   return book;
 }
 
@@ -33,6 +38,13 @@ std::vector<FrameNumber> IdentityBook::locked(const JobId& job) const {
   const auto found = jobs_.find(job);
   if (found == jobs_.end()) return {};
   return {found->second.locked.begin(), found->second.locked.end()};
+}
+
+std::int32_t IdentityBook::priority(const JobId& job, std::int32_t written) const {
+  const auto found = jobs_.find(job);
+  const bool is_set =
+      found != jobs_.end() && found->second.priority && found->second.priority->written == written;
+  return is_set ? found->second.priority->wanted : written;
 }
 
 bool IdentityBook::is_newest(const Digest& document) const {
@@ -78,6 +90,15 @@ Status IdentityBook::set_locked(Journal& journal, const JobId& job,
     if (!is_locked) found->second.locked.erase(frame);
   }
   return {};
+}
+
+Status IdentityBook::set_priority(Journal& journal, const JobId& job,
+                                  const PriorityChange& priority) {
+  const auto found = jobs_.find(job);
+  if (found == jobs_.end()) return {};
+  if (!found->second.priority && priority.wanted == priority.written) return {};
+  found->second.priority = priority;
+  return journal.record_priority(job, priority);
 }
 
 void IdentityBook::forget(const JobId& job) {

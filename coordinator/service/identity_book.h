@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -21,6 +22,8 @@ class IdentityBook {
   /// Frames of a job that count as done, whatever is in their files; ascending. None where it is
   /// not known.
   std::vector<FrameNumber> locked(const JobId& job) const;
+  /// The priority of a job whose document says `written`.
+  std::int32_t priority(const JobId& job, std::int32_t written) const;
   bool is_newest(const Digest& document) const;
   /// Oldest first; none where the job is not known.
   std::vector<Digest> versions(const JobId& job) const;
@@ -33,6 +36,8 @@ class IdentityBook {
   /// The frames count as done from now on, or no longer.
   Status set_locked(Journal& journal, const JobId& job, const std::vector<FrameNumber>& frames,
                     bool is_locked);
+  /// The job has this priority while its document says `written`.
+  Status set_priority(Journal& journal, const JobId& job, const PriorityChange& priority);
   /// The job is forgotten here; the journal forgets it with its documents.
   void forget(const JobId& job);
 
@@ -40,6 +45,7 @@ class IdentityBook {
   struct Job {
     JobTimes times;
     std::set<FrameNumber> locked;
+    std::optional<PriorityChange> priority;
     std::map<std::int32_t, Digest> versions;
   };
   std::map<JobId, Job> jobs_;

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "coordinator/schedule/held_states.h"
+#include "coordinator/schedule/reasons.h"
 #include "coordinator/service/history.h"
 
 namespace baton {
@@ -65,8 +66,8 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
     detail.frames.push_back(
         {.frame = number, .sampling = stats.sampling, .quality = stats.quality});
   }
-  detail.waits = scheduler.waits_for(digest, std::chrono::steady_clock::now());
-  detail.lacks_room = scheduler.lacks_room(digest);
+  detail.waits = waits_for(scheduler, digest, std::chrono::steady_clock::now());
+  detail.lacks_room = lacks_room(scheduler, digest);
   return detail;
 }
 

@@ -55,7 +55,9 @@ std::vector<WorkerSummary> Peers::summaries() const {
                       .host = entry.hello.host,
                       .pid = entry.hello.pid,
                       .num_threads = entry.hello.num_threads,
-                      .is_draining = entry.is_draining});
+                      .is_draining = entry.is_draining,
+                      .build = entry.hello.build,
+                      .renderer = entry.hello.renderer});
   }
   return result;
 }

@@ -39,6 +39,9 @@ template <> inline constexpr Rights kRights<PauseJob>           {"pause jobs",  
 template <> inline constexpr Rights kRights<ResumeJob>          {"resume jobs",   May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<CancelJob>          {"cancel jobs",   May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<LockFrames>         {"lock frames",   May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<SetPriority>        {"set priorities", May::no, May::own, May::yes};
+template <> inline constexpr Rights kRights<AskWhy>             {"ask why",       May::no,  May::yes, May::yes};
+template <> inline constexpr Rights kRights<ListTasks>          {"list tasks",    May::no,  May::yes, May::yes};
 template <> inline constexpr Rights kRights<DeleteJob>          {"delete jobs",   May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<DrainWorker>        {"drain workers", May::no,  May::no,  May::yes};
 template <> inline constexpr Rights kRights<StopCoordinator>    {"stop the farm", May::no,  May::no,  May::yes};

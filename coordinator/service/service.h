@@ -80,12 +80,13 @@ class Service {
   Status receive(const PeerId& peer, const PauseJob& message);
   Status receive(const PeerId& peer, const ResumeJob& message);
   Status receive(const PeerId& peer, const LockFrames& message);
+  Status receive(const PeerId& peer, const SetPriority& message);
+  Status receive(const PeerId& peer, const AskWhy& message);
+  Status receive(const PeerId& peer, const ListTasks& message);
   Status receive(const PeerId& peer, const DeleteJob& message);
   Status receive(const PeerId& peer, const DrainWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
   Status receive(const PeerId& peer, const ListEvents& message);
-  JobList list_workers() const;
-  void tell_lost(const Digest& job, const LostFiles& lost) const;
   template <class E>
   Status change_job(const PeerId& peer, const std::string& prefix);
   Status answer_detail(const PeerId& peer, const Digest& job, std::string plan = {});

@@ -15,6 +15,7 @@
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
 #include "common/store/frame_locks.h"
+#include "coordinator/service/answers.h"
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/plan_text.h"
@@ -35,6 +36,14 @@ Status expect_folder(const std::filesystem::path& folder) {
   return Error{ErrorKind::io,
                fmt::format("{}: the output folder cannot be made: {}{}", folder.string(),
                            there.string(), error ? ": " + error.message() : " is no folder")};
+}
+
+void tell_lost(const std::string& job, const LostFiles& lost) {
+  if (lost.tasks.empty()) return;
+  spdlog::warn("job {}: {} is gone or has another size{}", job, lost.first,
+               lost.tasks.size() > 1
+                   ? fmt::format(", and something of {} more tasks", lost.tasks.size() - 1)
+                   : "");
 }
 
 }  // namespace
@@ -95,6 +104,8 @@ Status Service::restore_job(const Digest& digest) {
   JobAdded event{digest, std::move(document->job), known.status, std::move(known.completions),
                  std::move(known.failures)};
   event.spec.leading_runs = known.plan.leading_runs;
+  event.spec.priority =
+      farm_.history.jobs().priority(farm_.history.jobs().of(digest).id, event.spec.priority);
   event.plan = std::move(known.plan);
   event.renderer = std::move(known.renderer);
   event.is_mixed = known.is_mixed;
@@ -124,7 +135,7 @@ Status Service::restore_job(const Digest& digest) {
       BATON_TRY(farm_.journal.record_status(digest, event.status));
     } else {
       if (lost.num_unknown > 0) farm_.to_inspect.emplace(digest, std::chrono::steady_clock::now());
-      tell_lost(digest, lost);
+      tell_lost(farm_.history.name_of(digest), lost);
       if (!lost.tasks.empty()) farm_.lost_before[digest] = lost_reasons(lost);
       event.lost = std::move(lost.tasks);
       event.lost_spares = std::move(lost.spares);
@@ -160,14 +171,6 @@ Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
   }
   return farm_.reply(peer, JobDocument{message.job, std::move(*document), std::move(token),
                                        farm_.history.jobs().of(message.job).id});
-}
-
-void Service::tell_lost(const Digest& job, const LostFiles& lost) const {
-  if (lost.tasks.empty()) return;
-  spdlog::warn("job {}: {} is gone or has another size{}", farm_.history.name_of(job), lost.first,
-               lost.tasks.size() > 1
-                   ? fmt::format(", and something of {} more tasks", lost.tasks.size() - 1)
-                   : "");
 }
 
 Status Service::receive(const PeerId& peer, const SubmitJob& message) {
@@ -251,7 +254,8 @@ Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const
 
 Status Service::receive(const PeerId& peer, const ListJobs& message) {
   const IdentityBook& known = farm_.history.jobs();
-  JobList list = list_workers();
+  const Answers answers(farm_);
+  JobList list = answers.list_workers();
   if (message.all) {
     BATON_ASSIGN(const std::vector<Bytes> ended,
                  farm_.journal.archived_summaries(limits::kMaxJobs));
@@ -273,28 +277,9 @@ Status Service::receive(const PeerId& peer, const ListJobs& message) {
   for (ListedJob& job : list.jobs) {
     job.identity = known.of(job.summary.version);
     job.summary.owner = farm_.owner_of(job.summary.version);
+    job.now = answers.now_of(job.summary.version, job.summary.status);
   }
   return farm_.reply(peer, std::move(list));
-}
-
-/// Workers with what they do, and what they might do.
-JobList Service::list_workers() const {
-  JobList list;
-  list.tasks_ready = farm_.scheduler.num_ready();
-  list.task_seconds = farm_.scheduler.longest_task_seconds();
-  list.workers = farm_.peers.summaries();
-  const TimePoint now = std::chrono::steady_clock::now();
-  for (WorkerSummary& worker : list.workers) {
-    for (const LeaseBook::Place& place : farm_.scheduler.leases().of_worker(worker.worker_id)) {
-      const Lease& lease = farm_.scheduler.leases().at(place);
-      const Scheduler::Job& job = *farm_.scheduler.find_job(lease.id.job);
-      const std::chrono::duration<double> time = now - lease.granted_at;
-      worker.tasks.push_back({farm_.history.jobs().of(lease.id.job).id,
-                              place_of(job, lease.id.task, lease.id.attempt), time.count()});
-    }
-    std::ranges::stable_sort(worker.tasks, std::greater(), &TaskInHand::seconds);
-  }
-  return list;
 }
 
 Status Service::receive(const PeerId& peer, const ListEvents& message) {
@@ -362,7 +347,7 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
                                             *lost.unreadable)});
     }
     pass(*job);
-    tell_lost(*job, lost);
+    tell_lost(farm_.history.name_of(*job), lost);
     const std::vector<std::string> reasons = lost_reasons(lost);
     BATON_TRY(farm_.step(JobResumed{*job, std::move(lost.tasks)}));
     plan = plan_text(*farm_.scheduler.find_job(*job), reasons);
@@ -417,6 +402,68 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   BATON_ASSIGN(const bool is_looked_at, farm_.explain_ended(*job, {}, message.off));
   if (is_looked_at) BATON_TRY(receive(PeerId(), SubmitJob{*text, false}));
   return answer_detail(peer, *job);
+}
+
+/// The scheduler's order changes, and no document.
+Status Service::receive(const PeerId& peer, const SetPriority& message) {
+  const Result<Digest> job = resolve_own(message.job);
+  if (!job) return farm_.refuse(peer, job.error());
+  const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
+  const std::string name = farm_.history.name_of(*job);
+  if (known == nullptr || !is_open(known->status)) {
+    return farm_.refuse(
+        peer, {ErrorKind::usage,
+               fmt::format("job {} has ended: only an open job has a place in the queue", name)});
+  }
+  if (message.priority < 0 || message.priority > limits::kMaxPriority) {
+    return farm_.refuse(peer,
+                        {ErrorKind::usage, fmt::format("priority: expected 0 to {}, got {}",
+                                                       limits::kMaxPriority, message.priority)});
+  }
+  BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
+  const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+  if (!document) return farm_.refuse(peer, document.error());
+  spdlog::info("job {}: priority {}, it was {}", name, message.priority, known->spec.priority);
+  BATON_TRY(farm_.history.prioritized(*job, known->spec.priority,
+                                      {document->job.priority, message.priority}));
+  BATON_TRY(farm_.step(PriorityChanged{*job, message.priority}));
+  return answer_detail(peer, *job);
+}
+
+Status Service::receive(const PeerId& peer, const AskWhy& message) {
+  const Answers answers(farm_);
+  Result<ReasonChain> chain = ReasonChain();
+  if (message.job.empty()) {
+    chain = answers.why_worker(message.worker);
+  } else {
+    const Result<Digest> job = resolve(message.job);
+    if (!job) return farm_.refuse(peer, job.error());
+    const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
+    BATON_ASSIGN(const auto ended,
+                 known ? std::optional<JobDetail>() : farm_.archived_detail(*job));
+    chain = answers.why_job(*job, ended ? ended->summary.status : JobStatus::running, message);
+  }
+  if (!chain) return farm_.refuse(peer, chain.error());
+  return farm_.reply(peer, std::move(chain).value());
+}
+
+Status Service::receive(const PeerId& peer, const ListTasks& message) {
+  constexpr int kMostFailures = 100;
+  std::vector<Digest> jobs = farm_.scheduler.jobs();
+  if (!message.job.empty()) {
+    const Result<Digest> job = resolve(message.job);
+    if (!job) return farm_.refuse(peer, job.error());
+    jobs = {*job};
+  }
+  const Answers answers(farm_);
+  TaskList list;
+  for (const Digest& job : jobs) {
+    for (ListedTask& task : answers.tasks_in_hand(job)) list.tasks.push_back(std::move(task));
+    BATON_ASSIGN(const std::vector<Failure> failures,
+                 farm_.journal.recent_failures(job, kMostFailures));
+    for (const Failure& failure : failures) list.tasks.push_back(answers.failed_task(job, failure));
+  }
+  return farm_.reply(peer, std::move(list));
 }
 
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
@@ -489,6 +536,7 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
     BATON_ASSIGN(shown.detail, farm_.living_detail(job));
     shown.detail.plan = std::move(plan);
     shown.detail.summary.owner = farm_.owner_of(job);
+    shown.now = Answers(farm_).now_of(job, shown.detail.summary.status);
     return farm_.reply(peer, std::move(shown));
   }
   BATON_ASSIGN(std::optional<JobDetail> detail, farm_.archived_detail(job));
@@ -499,8 +547,9 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
   }
   detail->summary.owner = farm_.owner_of(job);
   const JobIdentity identity = farm_.history.jobs().of(job);
+  const JobNow now = Answers(farm_).now_of(job, detail->summary.status);
   return farm_.reply(peer, ShownJob{identity, std::move(*detail), false, std::move(growth.said),
-                                    farm_.history.jobs().locked(identity.id)});
+                                    farm_.history.jobs().locked(identity.id), now});
 }
 
 }  // namespace baton

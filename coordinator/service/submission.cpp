@@ -210,6 +210,7 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
   BATON_ASSIGN(const Heritage heritage, find_heritage(document, message.restart, locked, reasons));
 
   JobAdded event{digest, document.job, JobStatus::running, {}, {}};
+  BATON_ASSIGN(event.spec.priority, farm_.history.priority_of(digest, document.job.priority));
   BATON_ASSIGN(const std::optional<std::string> known, farm_.journal.document(digest));
   BATON_TRY(take_over(heritage, known ? "" : message.json, event));
   LostFiles lost = find_lost_files(event, farm_.store, files_, locked);

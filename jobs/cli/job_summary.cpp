@@ -17,11 +17,6 @@ namespace {
 
 constexpr std::size_t kMostOdd = 5;
 
-/// null: it is not known, or has not come.
-ordered_json utc_json(std::int64_t time_ms) {
-  return time_ms == 0 ? ordered_json() : ordered_json(utc_iso(time_ms));
-}
-
 /// Appends the counters to an object.
 void add_sampling(const SamplingStats& s, ordered_json& object) {
   object["pixelsFresh"] = s.pixels_fresh;
@@ -103,10 +98,11 @@ ExitCode exit_code_of(const JobDetail& detail) {
 
 std::string job_line(const ListedJob& listed) {
   const JobSummary& job = listed.summary;
-  return fmt::format("{}  {:<9}  {:>11} frames  {:>15} tasks  {}", listed.identity.id.short_hex(),
-                     job_status_name(job.status),
+  return fmt::format("{}  {:<9}  {:>11} frames  {:>15} tasks  {}{}", listed.identity.id.short_hex(),
+                     job_activity_name(listed.now.activity),
                      fmt::format("{}/{}", job.frames_done, job.frames_total),
-                     fmt::format("{}/{}", job.tasks_done, job.tasks_total), job.name);
+                     fmt::format("{}/{}", job.tasks_done, job.tasks_total), job.name,
+                     listed.now.reason.empty() ? "" : "  [" + listed.now.reason + "]");
 }
 
 std::string long_job_line(const ListedJob& listed) {
@@ -209,6 +205,10 @@ std::string judgement_text(const JobDetail& detail) {
   return text;
 }
 
+ordered_json utc_json(std::int64_t time_ms) {
+  return time_ms == 0 ? ordered_json() : ordered_json(utc_iso(time_ms));
+}
+
 ordered_json place_json(const TaskPlace& place) {
   return {{"task", task_name(place.kind)},
           {"firstFrame", place.first.value()},
@@ -221,33 +221,6 @@ std::vector<std::string> fresh_growth(const ShownJob& job, std::size_t& num_told
   const std::size_t num_all = job.growth.size();
   const std::size_t first = std::min(std::exchange(num_told, num_all), num_all);
   return {job.growth.begin() + static_cast<std::ptrdiff_t>(first), job.growth.end()};
-}
-
-std::string worker_lines(const WorkerSummary& worker) {
-  std::string text = fmt::format("{:<24}  {:>3} threads  {:>3} leases  process {} on {}{}",
-                                 worker.worker_id, worker.num_threads, worker.tasks.size(),
-                                 worker.pid, worker.host, worker.is_draining ? ", drains" : "");
-  for (const TaskInHand& task : worker.tasks)
-    text += fmt::format("\n  job {}  {}  for {}", task.job.short_hex(), place_text(task.task),
-                        duration_text(task.seconds));
-  return text;
-}
-
-ordered_json worker_json(const WorkerSummary& worker) {
-  ordered_json tasks = ordered_json::array();
-  for (const TaskInHand& task : worker.tasks) {
-    ordered_json row = {{"job", task.job.hex()}};
-    row.update(place_json(task.task));
-    row["seconds"] = task.seconds;
-    tasks.push_back(std::move(row));
-  }
-  return {{"id", worker.worker_id},
-          {"host", worker.host},
-          {"pid", worker.pid},
-          {"threads", worker.num_threads},
-          {"leases", worker.tasks.size()},
-          {"draining", worker.is_draining},
-          {"tasks", std::move(tasks)}};
 }
 
 ordered_json summary_json(const ListedJob& listed) {
@@ -263,6 +236,8 @@ ordered_json summary_json(const ListedJob& listed) {
                          {"name", job.name},
                          {"owner", job.owner},
                          {"status", job_status_name(job.status)},
+                         {"activity", job_activity_name(listed.now.activity)},
+                         {"reason", listed.now.reason},
                          {"priority", job.priority},
                          {"outputDirectory", job.output_directory},
                          {"framesTotal", job.frames_total},
@@ -289,7 +264,7 @@ ordered_json summary_json(const ListedJob& listed) {
 
 ordered_json detail_json(const ShownJob& job) {
   const JobDetail& detail = job.detail;
-  ordered_json result = summary_json({job.identity, detail.summary});
+  ordered_json result = summary_json({job.identity, detail.summary, job.now});
   result["framesDoneNumbers"] = ordered_json::array();
   for (const FrameNumber frame : detail.frames_done)
     result["framesDoneNumbers"].push_back(frame.value());

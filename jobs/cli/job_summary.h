@@ -17,7 +17,7 @@ ExitCode exit_code_of_stopped(JobStatus status);
 /// How a command about a job ends; io where it has failed since frames are not what it has written.
 ExitCode exit_code_of(const JobDetail& detail);
 
-/// The job's line in a list.
+/// The job's line in a list: what it does, how far it is, and for what it waits.
 std::string job_line(const ListedJob& job);
 /// The job's line in a list with owner, priority and times.
 std::string long_job_line(const ListedJob& job);
@@ -34,12 +34,11 @@ std::string judgement_text(const JobDetail& detail);
 /// was submitted again begins anew.
 std::vector<std::string> fresh_growth(const ShownJob& job, std::size_t& num_told);
 
-/// The worker's line in a list, and one for each task that it has.
-std::string worker_lines(const WorkerSummary& worker);
-nlohmann::ordered_json worker_json(const WorkerSummary& worker);
 /// A task's kind, frames, tile and attempt.
 nlohmann::ordered_json place_json(const TaskPlace& place);
 
+/// null: it is not known, or has not come.
+nlohmann::ordered_json utc_json(std::int64_t time_ms);
 nlohmann::ordered_json summary_json(const ListedJob& job);
 nlohmann::ordered_json detail_json(const ShownJob& job);
 

@@ -30,7 +30,9 @@ constexpr const char* kFooter = R"(Examples:
   baton movie job.json               the sequence as it looks: preview.mp4, or PNGs
   baton job submit job.json          hands the job to a coordinator (see --coordinator)
   baton job list
+  baton job why shot7                why it is not done
   baton worker list
+  baton top                          jobs and workers of the farm, shown anew
   baton farm slurm job.json --nodes 1-8 --time 2:00:00
   baton key create keys              keys for a farm of several machines
   baton chart study.json             error against time of several methods, as charts
@@ -99,6 +101,7 @@ int main(int argc, char** argv) {
   baton::add_render_command(app, code);
   baton::add_job_command(app, code);
   baton::add_worker_command(app, code);
+  baton::add_top_command(app, code);
   baton::add_farm_command(app, code);
   baton::add_key_command(app, code);
   baton::add_state_command(app, code);

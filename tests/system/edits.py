@@ -48,7 +48,7 @@ class Workers:
 
     def switch(self):
         for worker in self.workers:
-            worker.kill() if self.rng.random() < 0.2 else worker.terminate()
+            worker.kill() if self.rng.random() < 0.05 else worker.terminate()
         for worker in self.workers:
             worker.wait()
         self.workers.clear()
@@ -107,7 +107,7 @@ class Sequence:
             waiter.wait()
         # From at once to after the end.
         self.next_at = time.monotonic() + self.rng.choice([0, 0.3, 1, 3]) * self.rng.random()
-        self.waits_for_end = self.rng.random() < 0.5
+        self.waits_for_end = self.rng.random() < 0.3
         return False
 
     def __str__(self):

@@ -109,6 +109,8 @@ def what_is_typed_beats_the_environment(programs, folder):
             continue
         seen += 1
         words = [*command, *([job] if " JOB" in usage else ["name"] if re.search(r" (ID|NAME)\b", usage) else [])]
+        if " SETTING" in usage:
+            words += ["priority=1"]
         if re.search(r"--frames .*REQUIRED", text):
             words += ["--frames", "1"]
         typed = desk.baton(*words, "--key", "typed.key", BATON_KEY="environment.key")

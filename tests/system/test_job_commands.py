@@ -165,7 +165,7 @@ def a_failed_job_is_retried(programs, folder):
         farm.start_worker()
         farm.baton("job", "wait", job, expect=FAILED)
         (folder / "elsewhere.off").rename(mesh)
-        check("running" in farm.baton("job", "retry", job).stdout, "retry does not say so")
+        check_equal(json.loads(farm.baton("job", "retry", job, "--json").stdout)["status"], "running", "status after retry")
         farm.baton("job", "wait", job)
 
 

@@ -8,7 +8,7 @@ import shutil
 import time
 from pathlib import Path
 
-from farm import BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, run_tests, wait_until
+from farm import BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
 
 
@@ -68,6 +68,9 @@ def roles_decide_who_may_do_what(programs, folder):
         farm.refused("anna", "job", "delete", job, says="user 'anna' may not change it")
         farm.refused("anna", "job", "submit", small(folder / "job", seed=8), "--restart",
                      says="user 'anna' may not change it")
+        farm.refused("anna", "job", "set", job, "priority=1", says="user 'anna' may not change it")
+        farm.refused("user", "farm", "stop", "--yes", says="user 'user' may not stop the farm")
+        check_says(farm.speak("anna", "job", "why", job).stdout, "the job is done")
         farm.refused("worker", "job", "list", says="worker 'worker' may not list jobs")
         stranger = farm.start_worker("stranger", key="user")
         check_equal(stranger.wait(), USAGE, "exit code of a worker with a user's key")
@@ -84,6 +87,15 @@ def roles_decide_who_may_do_what(programs, folder):
         wait_until(lambda: "worker0" in farm.speak("admin", "worker", "list").stdout, "the worker is back")
         farm.speak("admin", "worker", "drain", "worker0")
         check_equal(farm.workers[0].wait(), OK, "exit code of the drained worker")
+
+        # Who paused it is told: its owner, or another.
+        job = json.loads(farm.speak("user", "job", "submit", small(folder / "again"), "--json").stdout)["id"]
+        for who, told in (("user", "paused by its owner user, since 2"), ("admin", "paused by admin, since 2")):
+            farm.speak(who, "job", "pause", job)
+            check_says(farm.speak("anna", "job", "why", job).stdout, told)
+            farm.speak(who, "job", "resume", job)
+        farm.speak("admin", "farm", "stop", "--yes")
+        check_equal(farm.coordinator.wait(), OK, "exit code of the stopped coordinator")
 
 
 def without_the_right_key_nobody_comes_in(programs, folder):

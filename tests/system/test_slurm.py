@@ -62,7 +62,8 @@ class SlurmFarm:
         answer = self.baton("worker", "list", "--json", expect=None)
         if answer.returncode != OK:
             return set()
-        return {worker["id"].removeprefix("slurm-").partition("#")[0] for worker in json.loads(answer.stdout)}
+        return {worker["id"].removeprefix("slurm-").partition("#")[0] for worker in json.loads(answer.stdout)
+                if worker["activity"] != "lost"}
 
     def keep_busy(self):
         """Submits the job when it is not there, and again when it is done, after a look at what came of it."""

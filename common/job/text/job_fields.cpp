@@ -331,7 +331,7 @@ void check_whole(JobArchive& a, const JobSpec& job) {
 void fields(JobArchive& a, JobSpec& job) {
   a.integer("specificationVersion", job.specification_version, 1, 1);
   name_fields(a, job);
-  a.integer("priority", job.priority, 0, 100);
+  a.integer("priority", job.priority, 0, limits::kMaxPriority);
   a.texts("metadata", job.metadata, limits::kMaxMetadata);
   frame_fields(a, job);
   a.integer("seed", job.seed);

@@ -5,7 +5,6 @@
 #include <array>
 #include <filesystem>
 #include <functional>
-#include <map>
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
@@ -13,6 +12,7 @@
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/events_command.h"
+#include "jobs/cli/farm/farm_status.h"
 #include "jobs/cli/farm/slurm_farm.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/render/render_session.h"
@@ -165,45 +165,6 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
   return outcome;
 }
 
-/// Jobs, pilots beside their workers, and the workers that are none.
-Result<ExitCode> show_status(const CoordinatorLink& link) {
-  BATON_ASSIGN(RequestClient client, link.connect());
-  BATON_ASSIGN(const JobList list, ask<JobList>(client, ListJobs{}));
-  for (const ListedJob& job : list.jobs) fmt::print("{}\n", job_line(job));
-  fmt::print("{} jobs, {} tasks are ready\n\n", list.jobs.size(), list.tasks_ready);
-
-  std::multimap<std::string, const WorkerSummary*> of_pilots;
-  std::vector<const WorkerSummary*> others;
-  for (const WorkerSummary& worker : list.workers) {
-    if (const auto pilot = pilot_of_worker(worker.worker_id)) {
-      of_pilots.emplace(*pilot, &worker);
-    } else {
-      others.push_back(&worker);
-    }
-  }
-  const Result<std::vector<SlurmPilot>> pilots = find_pilots("");
-  if (!pilots) fmt::print("no word from Slurm: {}\n", pilots.error().message);
-  std::size_t count = 0;
-  for (const SlurmPilot& pilot : pilots ? *pilots : std::vector<SlurmPilot>()) {
-    if (!pilot.job_name.starts_with(kJobNamePrefix)) continue;
-    ++count;
-    const auto print = [&](const std::string& worker) {
-      fmt::print("pilot {:<10} {:<10} {:<10} {:>10} left  {}\n", pilot.id, pilot.state_text,
-                 pilot.node.empty() ? pilot.reason : pilot.node, pilot.time_left, worker);
-    };
-    const auto [first, last] = of_pilots.equal_range(pilot.id);
-    if (first == last) print("no worker");
-    for (auto worker = first; worker != last; ++worker) print(worker_lines(*worker->second));
-    of_pilots.erase(first, last);
-  }
-  for (const auto& [id, worker] : of_pilots)
-    fmt::print("pilot {:<10} {:<10} {:<10} {:>10}       {}\n", id, "", "not in the queue", "",
-               worker_lines(*worker));
-  for (const WorkerSummary* const worker : others) fmt::print("{}\n", worker_lines(*worker));
-  fmt::print("{} pilots, {} workers\n", count, list.workers.size());
-  return ExitCode::ok;
-}
-
 void add_slurm_command(CLI::App& farm, ExitCode& code) {
   auto options = std::make_shared<FarmCommandOptions>();
   CLI::App* slurm = farm.add_subcommand(
@@ -267,12 +228,7 @@ void add_farm_command(CLI::App& app, ExitCode& code) {
   farm->require_subcommand(1);
   add_slurm_command(*farm, code);
   add_events_command(*farm, code);
-
-  auto link = std::make_shared<CoordinatorLink>();
-  CLI::App* status =
-      farm->add_subcommand("status", "Jobs, pilots of Slurm beside their workers, other workers");
-  add_coordinator_options(*status, *link);
-  status->callback([link, &code] { code = finish_with_coordinator(show_status(*link)); });
+  add_status_commands(*farm, code);
 }
 
 }  // namespace baton

@@ -12,6 +12,8 @@
 #include "common/job/text/job_json.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/farm/job_list.h"
+#include "jobs/cli/farm/job_questions.h"
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/settle_method.h"
@@ -33,8 +35,6 @@ struct JobOptions {
   bool restart = false;                   ///< submit
   std::optional<FrameNumber> from_frame;  ///< submit
   int rounds = 0;                         ///< refine; 0: as many as a sweep has
-  bool all = false;                       ///< list
-  bool is_long = false;                   ///< list
   bool all_ended = false;                 ///< delete
   std::string frames;                     ///< lock
   bool off = false;                       ///< lock
@@ -76,30 +76,10 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   return ExitCode::ok;
 }
 
-Result<ExitCode> list(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{options.all}));
-  if (!options.json) {
-    for (const ListedJob& job : found.jobs)
-      fmt::print("{}\n", options.is_long ? long_job_line(job) : job_line(job));
-    fmt::print("{} jobs, {} workers", found.jobs.size(), found.workers.size());
-    if (!options.all && found.num_ended > 0)
-      fmt::print("; --all shows {} that have ended", found.num_ended);
-    fmt::print("\n");
-    return ExitCode::ok;
-  }
-  ordered_json result = {{"jobs", ordered_json::array()}, {"workers", ordered_json::array()}};
-  for (const ListedJob& job : found.jobs) result["jobs"].push_back(summary_json(job));
-  for (const WorkerSummary& worker : found.workers) {
-    result["workers"].push_back(worker_json(worker));
-  }
-  fmt::print("{}\n", result.dump(2));
-  return ExitCode::ok;
-}
-
 void print_detail(const ShownJob& job, bool json) {
   const JobDetail& detail = job.detail;
   if (json) return fmt::print("{}\n", detail_json(job).dump(2));
-  fmt::print("{}\n", job_line({job.identity, detail.summary}));
+  fmt::print("{}\n", job_line({job.identity, detail.summary, job.now}));
   fmt::print("output     {}\n", detail.summary.output_directory);
   if (!detail.summary.owner.empty()) fmt::print("owner      {}\n", detail.summary.owner);
   fmt::print("{}", times_text(job.identity.times));
@@ -108,6 +88,8 @@ void print_detail(const ShownJob& job, bool json) {
   if (!job.locked.empty()) fmt::print("locked     {}\n", format_frames(job.locked));
   fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
   if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
+  if (!job.now.reason.empty() && detail.waits.empty())
+    fmt::print("because    {}\n", job.now.reason);
   for (const std::string& note : detail.notes) fmt::print("warning    {}\n", note);
   for (const std::string& failure : detail.failures) fmt::print("failure    {}\n", failure);
 }
@@ -303,11 +285,9 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   hand_in->add_flag("--restart", submission->restart,
                     "replace the frames of another picture in the output folder");
   add_from_frame_option(*hand_in, submission->from_frame);
-  const auto [lists, wanted] =
-      add("list", "The jobs of the coordinator that have not ended", "", list);
-  lists->add_flag("--all", wanted->all, "also those that have ended");
-  lists->add_flag("-l,--long", wanted->is_long, "with owner, priority and times (UTC)");
+  add_list_command(*job, code);
   add("show", "One job: progress, statistics, failures", "ID", show);
+  add_job_questions(*job, code);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
       change<PauseJob>);
   add("resume", "Goes on with a paused job", "ID", change<ResumeJob>);

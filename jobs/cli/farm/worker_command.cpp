@@ -2,7 +2,8 @@
 
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
-#include "jobs/cli/job_summary.h"
+#include "jobs/cli/farm/job_questions.h"
+#include "jobs/cli/farm/worker_text.h"
 
 namespace baton {
 namespace {
@@ -15,21 +16,24 @@ struct WorkerCommandOptions {
   bool json = false;
 };
 
-void print_workers(const std::vector<WorkerSummary>& workers, bool json) {
+void print_workers(const JobList& found, bool json) {
   if (json) {
     ordered_json list = ordered_json::array();
-    for (const WorkerSummary& worker : workers) list.push_back(worker_json(worker));
+    for (const WorkerSummary& worker : found.workers) list.push_back(worker_json(worker));
+    for (const LostWorker& worker : found.lost) list.push_back(lost_json(worker));
     return fmt::print("{}\n", list.dump(2));
   }
-  for (const WorkerSummary& worker : workers) fmt::print("{}\n", worker_lines(worker));
-  fmt::print("{} workers\n", workers.size());
+  for (const WorkerSummary& worker : found.workers) fmt::print("{}\n", worker_lines(worker));
+  for (const LostWorker& worker : found.lost) fmt::print("{}\n", lost_line(worker));
+  fmt::print("{} workers{}\n", found.workers.size(),
+             found.lost.empty() ? "" : fmt::format(", {} lost in a day", found.lost.size()));
 }
 
 /// question: ListJobs or DrainWorker.
 Result<ExitCode> ask_for_workers(const WorkerCommandOptions& options, const Message& question) {
   BATON_ASSIGN(RequestClient client, options.link.connect());
   BATON_ASSIGN(const JobList found, ask<JobList>(client, question));
-  print_workers(found.workers, options.json);
+  print_workers(found, options.json);
   return ExitCode::ok;
 }
 
@@ -54,7 +58,8 @@ void add_worker_command(CLI::App& app, ExitCode& code) {
     });
     return std::pair(command, options.get());
   };
-  add("list", "All connected workers, and what each does for how long",
+  add_worker_questions(*worker, code);
+  add("list", "Connected workers: what each does, for how long; those that were lost in a day",
       [](const WorkerCommandOptions&) { return ListJobs{}; });
   const auto [drain, drained] =
       add("drain", "Lets a worker finish what it renders, then end; its other tasks go to others",

@@ -52,6 +52,8 @@ const JobSummary kSummary{
 
 const JobIdentity kIdentity{{9}, 2, {10, 11, 12}};
 const TaskPlace kPlace{TaskKind::second_pass, FrameNumber(3), FrameNumber(4), 5, 6};
+const UsualTime kUsual{1.5, 0.5, 7};
+const JobNow kNow{JobActivity::waiting, "space"};
 
 /// One of each, in the order of the type codes, no member left at its default.
 const std::vector<Message>& examples() {
@@ -76,7 +78,22 @@ const std::vector<Message>& examples() {
       CancelJob{"def"},
       StopCoordinator{},
       JobAccepted{kIdentity, {5, 6}, true, "all is kept"},
-      JobList{{{kIdentity, kSummary}}, {{"w", "h", 1, 2, {{{9}, kPlace, 1.5}}, true}}, 4, 5, 6.5},
+      JobList{{{kIdentity, kSummary, kNow}},
+              {{"w",
+                "h",
+                1,
+                2,
+                {{{9}, kPlace, 1.5, kUsual}},
+                true,
+                WorkerActivity::draining,
+                2.5,
+                "baton 1",
+                "AVX2",
+                {{{9}, "/shows"}}}},
+              4,
+              5,
+              6.5,
+              {{"v", "2 threads", 8, 9}}},
       ShownJob{kIdentity,
                {kSummary,
                 {FrameNumber(1), FrameNumber(2), FrameNumber(3)},
@@ -88,7 +105,8 @@ const std::vector<Message>& examples() {
                 {"odd"}},
                true,
                {"4 rounds"},
-               {FrameNumber(7)}},
+               {FrameNumber(7)},
+               kNow},
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
@@ -100,10 +118,15 @@ const std::vector<Message>& examples() {
       StatesPublished{{1, 2}, {{kBlob, kBlob}}},
       RequestStates{{3, 4}, {{5, 6}}},
       BlobsLeft{kLease, {{5, 6}}},
-      ListEvents{"abc", {{9}, 3, 4, 5, false}},
+      ListEvents{"abc", {{9}, 3, 4, 5, false, 6}},
       EventList{{{1, 2, FarmEventKind::task_lost, "a", {9}, true, kPlace, "w", "gone", 2.5}},
                 {{FarmEventKind::task_done, 3, 4.5}}},
       LockFrames{"abc", {FrameNumber(1), FrameNumber(5)}, true},
+      SetPriority{"abc", 80},
+      AskWhy{"abc", "w", true, FrameNumber(3), 4},
+      ReasonChain{{{ReasonKind::store, "no room", {9}, true, kPlace, {"w"}, 1.5, kUsual, 2, 3, 4}}},
+      ListTasks{"abc"},
+      TaskList{{{{9}, true, kPlace, "w", true, 1.5, kUsual, "boom"}}},
   };
   return messages;
 }
@@ -127,13 +150,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 14);
+  static_assert(kProtocolVersion == 15);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "a569ae79bda3dde0e4f623bc04f8644d");
+  EXPECT_EQ(digest_of(all).hex(), "39cc0f8155df6a3f49987e879e3e348b");
 }
 
 TEST(Messages, MembersArriveWhereTheyWereSent) {
@@ -146,7 +169,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0E\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0F\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -186,12 +209,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{15};
+  frames[0][5] = std::byte{16};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 15, this program speaks 14"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 16, this program speaks 15"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

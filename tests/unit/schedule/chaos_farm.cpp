@@ -192,6 +192,62 @@ void ChaosFarm::on(const GrantLease& a) {
   if (arrives) held_[a.worker].emplace(a.lease, Held{a.inputs, a.steps, a.may_hold && roll(5) > 0});
 }
 
+std::optional<ReasonKind> ChaosFarm::check_reasons() const {
+  if (status() != JobStatus::running) return std::nullopt;
+  const LeaseBook& leases = scheduler_->leases();
+  const Reasons reasons(*scheduler_, now_);
+  const auto check_chain = [&](const std::vector<Cause>& chain) {
+    if (chain.empty()) return void(ADD_FAILURE() << "no reason");
+    EXPECT_TRUE(is_last(chain.back().kind)) << "no end: " << reason_kind_name(chain.back().kind);
+    for (const Cause& cause : chain) {
+      for (const std::string& worker : cause.workers)
+        EXPECT_TRUE(leases.knows(worker)) << worker << " has left and is blamed";
+    }
+  };
+  for (const std::string& worker : leases.connected()) check_chain(reasons.of_worker(worker));
+  const std::vector<Cause> chain = reasons.of_job(job_);
+  check_chain(chain);
+  if (testing::Test::HasFailure()) return std::nullopt;
+
+  // The same farm, without the last cause.
+  const Cause& last = chain.back();
+  Scheduler trial = *scheduler_;
+  std::string helper = "helper";
+  std::vector<Action> follows;
+  if (last.kind == ReasonKind::asking)
+    helper = last.workers.empty() ? helper : last.workers.front();
+  if (last.kind == ReasonKind::running)
+    follows = trial.step(WorkerLeft{last.workers.front()}, now_);
+  if (last.kind == ReasonKind::inspecting) {
+    trial.step(FramesInspected{job_}, now_);
+    EXPECT_EQ(trial.find_job(job_)->status, JobStatus::done);
+    return last.kind;
+  }
+  if (last.kind == ReasonKind::store) return last.kind;
+  if (helper == "helper")
+    trial.step(WorkerJoined{helper, {}, trial.find_job(job_)->renderer}, now_);
+  std::ranges::move(trial.step(WorkRequested{helper, 100}, now_), std::back_inserter(follows));
+  if (!all_of<GrantLease>(follows).empty()) return last.kind;
+  const std::vector<Cause> after = Reasons(trial, now_).of_job(job_);
+  EXPECT_TRUE(after.back().kind == ReasonKind::store ||
+              (after.back().kind == ReasonKind::running && after.back().task != last.task))
+      << "it does not go on without its last cause: " << reason_kind_name(last.kind);
+  const auto told = [&](const std::vector<Cause>& of) {
+    std::string text;
+    for (const Cause& cause : of) {
+      text += std::string(reason_kind_name(cause.kind)) + " ";
+      if (cause.task) text += describe_task(*cause.task) + " ";
+      for (const std::string& worker : cause.workers) text += worker + " ";
+      text += "| ";
+    }
+    return text;
+  };
+  if (testing::Test::HasFailure())
+    ADD_FAILURE() << "before: " << told(chain) << "\nafter: " << told(after);
+  EXPECT_NE(last.kind, ReasonKind::asking) << "there was no room for what it would have asked for";
+  return last.kind;
+}
+
 void ChaosFarm::check_renderer(const TaskKey& task) {
   if (options_.num_renderers == 1) return;
   const std::string renderer = renderer_of(reporter_);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <random>
 
+#include "coordinator/schedule/reasons.h"
 #include "tests/unit/schedule/farm.h"
 
 namespace baton::testing_farm {
@@ -42,6 +43,10 @@ class ChaosFarm {
   void change_job(JobSpec next);
 
   void resume() { step(JobResumed{job_}); }
+
+  /// While the job is not done there is a chain of reasons, which names nobody who has left; and
+  /// without its last cause the job goes on. The farm stays as it is. Returns the last cause.
+  std::optional<ReasonKind> check_reasons() const;
 
   /// Nothing that it made is left then.
   void delete_job();

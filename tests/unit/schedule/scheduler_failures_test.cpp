@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/limits.h"
+#include "coordinator/schedule/reasons.h"
 #include "tests/unit/schedule/farm.h"
 
 namespace baton {
@@ -95,13 +96,13 @@ TEST_F(SchedulerTest, OnlyWhoRendersAlikeGoesOn) {
   farm.step(WorkerLeft{"b"});
   farm.step(WorkerJoined{"c", {held[1].lease}, "SSE4"});
   EXPECT_THAT(farm.ask("c", 1), SizeIs(0));
-  EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now),
+  EXPECT_THAT(waits_for(farm.scheduler, farm.job, farm.now),
               AllOf(HasSubstr("with AVX2"), HasSubstr("render with SSE4"), HasSubstr("--isa")));
   // Where it does not matter, anybody goes on.
   farm.step(WorkerJoined{"d", {}});
   EXPECT_THAT(farm.ask("d", 1), SizeIs(1));
   farm.step(WorkerJoined{"e", {}, "AVX2"});
-  EXPECT_EQ(farm.scheduler.waits_for(farm.job, farm.now), "");
+  EXPECT_EQ(waits_for(farm.scheduler, farm.job, farm.now), "");
 }
 
 /// A job of 2 tiles, 4 frames, 2 frames a run; each frame is by one renderer.
@@ -131,7 +132,7 @@ TEST_F(TakeOverTest, OthersWaitWhileSomebodyRendersAsWasBegun) {
     farm.step(WorkerAlive{"a", {}});
     EXPECT_THAT(all_of<GrantLease>(wait(kSilence)), SizeIs(0));
   }
-  EXPECT_EQ(farm.scheduler.waits_for(farm.job, farm.now), "");
+  EXPECT_EQ(waits_for(farm.scheduler, farm.job, farm.now), "");
 }
 
 TEST_F(TakeOverTest, FramesThatAreNotDoneAreMadeAgain) {
@@ -183,7 +184,7 @@ TEST_F(SchedulerTest, AJobWhoseTaskKeepsLosingItsWorkersIsPaused) {
     }
     EXPECT_EQ(losses, limits::kMaxTaskLosses);
     EXPECT_EQ(farm.status(), JobStatus::paused);
-    EXPECT_THAT(farm.scheduler.find_job(farm.job)->waits, HasSubstr("run 0 of tile 0"));
+    EXPECT_THAT(farm.scheduler.find_job(farm.job)->waits, HasSubstr("frames 1-2, tile 0"));
     farm.step(JobResumed{farm.job, {}});
   }
   EXPECT_EQ(farm.progress().tasks_failed, 0u);
@@ -308,14 +309,14 @@ struct DeadEnd : Farm {
     step(WorkerJoined{"a", {}});
     step(WorkerJoined{"b", {}});
     fail(ask_one("a"), /*permanent=*/true);
-    EXPECT_EQ(scheduler.waits_for(job, now), "") << "b may do it";
+    EXPECT_EQ(waits_for(scheduler, job, now), "") << "b may do it";
     step(WorkerLeft{"b"});
     EXPECT_THAT(ask("a", 1), IsEmpty());
-    EXPECT_THAT(scheduler.waits_for(job, now), HasSubstr("a worker that can do run 0 of tile 0"));
+    EXPECT_THAT(waits_for(scheduler, job, now), HasSubstr("a worker that can do frame 1, tile 0"));
   }
   void expect_that_it_is_done_by(const std::string& worker) {
     step(WorkerJoined{worker, {}});
-    EXPECT_EQ(scheduler.waits_for(job, now), "");
+    EXPECT_EQ(waits_for(scheduler, job, now), "");
     finish(ask_one(worker));
     EXPECT_EQ(progress().tasks_done, 1u);
   }
@@ -411,7 +412,7 @@ TEST(SchedulerFailures, NobodyRestsWhereAllWould) {
   farm.step(WorkerJoined{"good", {}});
   farm.fail_twice();
   farm.step(WorkerLeft{"good"});
-  EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now), IsEmpty());
+  EXPECT_THAT(waits_for(farm.scheduler, farm.job, farm.now), IsEmpty());
   EXPECT_THAT(farm.ask("bad", 1), SizeIs(1));
 }
 
@@ -453,10 +454,10 @@ TEST(SchedulerFailures, WhoDoesNotSeeAJobGetsNothingOfItForAWhile) {
   const GrantLease grant = farm.ask_one("blind");
   farm.step(LeaseReturned{"blind", grant.lease, "/shows"});
   EXPECT_THAT(farm.ask("blind", 1), IsEmpty());
-  EXPECT_EQ(farm.scheduler.waits_for(farm.job, farm.now), "a worker that sees /shows");
+  EXPECT_EQ(waits_for(farm.scheduler, farm.job, farm.now), "a worker that sees /shows");
 
   farm.step(WorkerJoined{"sees", {}});
-  EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now), IsEmpty());
+  EXPECT_THAT(waits_for(farm.scheduler, farm.job, farm.now), IsEmpty());
   EXPECT_THAT(farm.ask("sees", 1), SizeIs(1));
   EXPECT_EQ(farm.progress().attempts_lost, 0u);
   farm.now += Standings::kBlindRest;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/limits.h"
+#include "coordinator/schedule/reasons.h"
 #include "tests/unit/schedule/farm.h"
 
 /// Cancelled jobs, blobs that nobody needs, restarts of the coordinator.
@@ -228,10 +229,10 @@ TEST_F(SchedulerTest, AJobIsDoneWhenItsFramesHaveBeenInspected) {
 
   // Paused meanwhile, it asks again when it goes on.
   step(JobPaused{farm.job, "a folder"});
-  EXPECT_EQ(scheduler.waits_for(farm.job, farm.now), "a folder");
+  EXPECT_EQ(waits_for(scheduler, farm.job, farm.now), "a folder");
   EXPECT_THAT(step(FramesInspected{farm.job}), IsEmpty());
   EXPECT_THAT(all_of<InspectFrames>(step(JobResumed{farm.job})), SizeIs(1));
-  EXPECT_EQ(scheduler.waits_for(farm.job, farm.now), "");
+  EXPECT_EQ(waits_for(scheduler, farm.job, farm.now), "");
   const auto ends = all_of<RecordJobStatus>(step(FramesInspected{farm.job}));
   ASSERT_THAT(ends, SizeIs(1));
   EXPECT_EQ(ends[0].status, JobStatus::done);
@@ -248,7 +249,7 @@ TEST_F(SchedulerTest, AJobWithFramesOfOthersFails) {
       all_of<RecordJobStatus>(strict.step(FramesInspected{farm.job, {}, "a frame"}, farm.now));
   ASSERT_THAT(ends, SizeIs(1));
   EXPECT_EQ(ends[0].status, JobStatus::failed);
-  EXPECT_EQ(strict.waits_for(farm.job, farm.now), "a frame");
+  EXPECT_EQ(waits_for(strict, farm.job, farm.now), "a frame");
 }
 
 // Somebody who takes frames away as they come is told, and not served for ever.
@@ -271,7 +272,7 @@ TEST_F(SchedulerTest, AFrameThatIsLostTooOftenPausesItsJob) {
   }
   EXPECT_EQ(own.status(), JobStatus::paused);
   EXPECT_EQ(num_lost, limits::kMaxTaskLosses);
-  EXPECT_THAT(own.scheduler.waits_for(own.job, own.now), testing::HasSubstr("lost 16 times"));
+  EXPECT_THAT(waits_for(own.scheduler, own.job, own.now), testing::HasSubstr("lost 16 times"));
 }
 
 // ---- frames that others have written ------------------------------------------------------------

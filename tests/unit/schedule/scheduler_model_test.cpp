@@ -90,6 +90,28 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
   EXPECT_GT(num_missing, num_seeds() / 50) << "alike blobs went between publishing and reporting";
 }
 
+// With one renderer or two, blind to nothing, and in half of the farms with too small a store.
+TEST(SchedulerModel, AJobThatIsNotDoneHasAReason) {
+  std::map<ReasonKind, std::size_t> seen;
+  for (std::uint32_t seed = 1; seed <= num_seeds() / 2; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    const JobSpec spec = job_of_any_kind(seed);
+    const std::uint64_t limit = seed % 2 == 0 ? 60 + 20 * (seed % 20) : 0;
+    ChaosFarm farm(seed, spec,
+                   {.num_workers = 1 + static_cast<int>(seed % 4),
+                    .store_limit = limit,
+                    .num_renderers = 1 + static_cast<int>(seed / 4 % 2)});
+    for (int steps = 0; farm.status() == JobStatus::running && steps < 600; ++steps) {
+      farm.advance(/*trouble=*/true);
+      if (const auto kind = steps % 7 == 0 ? farm.check_reasons() : std::nullopt) ++seen[*kind];
+      if (testing::Test::HasFailure()) return;
+    }
+  }
+  for (const ReasonKind kind : {ReasonKind::running, ReasonKind::no_worker, ReasonKind::asking,
+                                ReasonKind::store, ReasonKind::renderer})
+    EXPECT_GT(seen[kind], num_seeds() / 50) << reason_kind_name(kind);
+}
+
 // Renderers take over from each other at whole frames, with all that goes wrong.
 TEST(SchedulerModel, AFrameIsByOneRenderer) {
   std::size_t num_taken_over = 0, num_reopened = 0;

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "coordinator/schedule/reasons.h"
 #include "tests/unit/schedule/farm.h"
 
 namespace baton {
@@ -153,7 +154,7 @@ TEST_F(SchedulerTest, AnotherResultThanBeforeKeepsAJobFromItsEnd) {
   EXPECT_EQ(num_conflicts, 1u);
   EXPECT_EQ(again.progress().tasks_open, 0u);
   EXPECT_EQ(again.status(), JobStatus::paused);
-  EXPECT_THAT(again.scheduler.waits_for(again.job, again.now), testing::HasSubstr("different"));
+  EXPECT_THAT(waits_for(again.scheduler, again.job, again.now), testing::HasSubstr("different"));
   again.step(JobResumed{again.job, {}});
   EXPECT_EQ(again.status(), JobStatus::done);
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "coordinator/schedule/reasons.h"
 #include "tests/unit/schedule/farm.h"
 
 /// What is rendered where the store has a limit. In these tests a film takes 10 bytes, a state 20,
@@ -24,7 +25,7 @@ struct LimitedFarm : Farm {
     step(WorkerJoined{"a", {}});
     step(WorkerJoined{"b", {}});
   }
-  std::string waits() const { return scheduler.waits_for(job, now); }
+  std::string waits() const { return waits_for(scheduler, job, now); }
 };
 
 TEST(StoreLimit, OneTaskTellsHowLargeItsBlobsAre) {
@@ -73,7 +74,7 @@ TEST(StoreLimit, AJobThatCannotGoOnSaysWhy) {
   LimitedFarm farm(70);
   farm.finish(farm.ask_one("a"));
   EXPECT_THAT(farm.ask("a", 1), IsEmpty());
-  EXPECT_TRUE(farm.scheduler.lacks_room(farm.job));
+  EXPECT_TRUE(lacks_room(farm.scheduler, farm.job));
   EXPECT_EQ(
       farm.waits(),
       "room in the store: it holds 40 B of the 70 B that --store-limit allows, 0 B of them of "
@@ -83,7 +84,7 @@ TEST(StoreLimit, AJobThatCannotGoOnSaysWhy) {
   LimitedFarm other(1000);
   for (int i = 0; i < 2; ++i) other.finish(other.ask_one("a"));
   other.step(StoreKeeps{1000});
-  EXPECT_FALSE(other.scheduler.lacks_room(other.job));
+  EXPECT_FALSE(lacks_room(other.scheduler, other.job));
 }
 
 TEST(StoreLimit, AJobGoesOnWhenAnotherIsDeleted) {

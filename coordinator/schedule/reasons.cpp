@@ -1,0 +1,406 @@
+#include "coordinator/schedule/reasons.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/size_text.h"
+#include "coordinator/schedule/held_states.h"
+
+namespace baton {
+namespace {
+
+constexpr std::size_t kMostLinks = 8;
+constexpr std::size_t kMostShown = 16;
+
+/// The task to begin with: the first frame that is not written, else whatever is open.
+std::optional<TaskIndex> first_open_task(const JobTasks& tasks) {
+  const JobGraph& graph = tasks.graph();
+  const FrameIndex frame = tasks.book().first_open_frame();
+  if (frame < FrameIndex(graph.num_frames())) return graph.find(assemble_task(frame));
+  for (TaskIndex task = 0; task < graph.num_tasks(); ++task) {
+    if (is_open(tasks.book().status(task))) return task;
+  }
+  return std::nullopt;
+}
+
+/// What holds back tasks of later steps: an open task of the first step that is not done.
+std::optional<TaskIndex> earliest_open_task(const JobTasks& tasks) {
+  const JobGraph& graph = tasks.graph();
+  const Run run = graph.timeline().run_of(first_open_step(graph, tasks.book()));
+  for (std::int32_t tile = 0; tile < graph.num_tiles(); ++tile) {
+    const std::optional<TaskIndex> task = graph.find(render_task(run, tile));
+    if (task && is_open(tasks.book().status(*task))) return task;
+  }
+  return first_open_task(tasks);
+}
+
+/// Of what a blocked task needs, the one that is furthest from being done; nullopt: nothing, where
+/// what it needs has failed.
+std::optional<TaskIndex> furthest_input(const Scheduler::Job& job, TaskIndex task,
+                                        const Crew& crew) {
+  const auto rank = [&](TaskIndex input) {
+    const TaskStatus status = job.tasks.book().status(input);
+    if (!is_open(status)) return 0;
+    const bool is_stuck =
+        status == TaskStatus::ready && !somebody_may_try(crew, job.tasks.attempts().blame(input));
+    return is_stuck ? 1 : 2 + static_cast<int>(status);
+  };
+  std::optional<TaskIndex> furthest;
+  for (const TaskIndex input : job.tasks.graph().inputs(job.tasks.graph().key(task))) {
+    if (job.tasks.book().status(input) == TaskStatus::done) continue;
+    if (!furthest || rank(input) < rank(*furthest)) furthest = input;
+  }
+  return furthest;
+}
+
+/// A long chain without its middle.
+std::vector<Cause> shortened(std::vector<Cause> chain) {
+  if (chain.size() <= kMostLinks) return chain;
+  const auto first = chain.begin() + kMostLinks / 2;
+  const auto last = chain.end() - (kMostLinks / 2 - 1);
+  const auto count = static_cast<std::size_t>(last - first);
+  *first = {.kind = ReasonKind::skipped, .job = first->job, .count = count};
+  chain.erase(first + 1, last);
+  return chain;
+}
+
+std::string room_text(const Scheduler& scheduler, const Scheduler::Job& job) {
+  const JobGraph& graph = job.tasks.graph();
+  return fmt::format(
+      "room in the store: it holds {} of the {} that --store-limit allows, {} of them of jobs that "
+      "have ended, and the next task needs about {}: raise the limit, or delete ended jobs",
+      bytes_text(scheduler.store_bytes()), bytes_text(scheduler.room().limit),
+      bytes_text(scheduler.kept_bytes()),
+      bytes_text(job.sizes.largest(graph, graph.key(*job.tasks.book().ready().begin()))));
+}
+
+}  // namespace
+
+std::vector<Cause> Reasons::of_job(const Digest& digest) const {
+  const Scheduler::Job& job = *scheduler_.find_job(digest);
+  if (const auto end = end_of(digest, job)) return {*end};
+  const std::optional<TaskIndex> task = first_open_task(job.tasks);
+  if (!task) return {{.kind = ReasonKind::inspecting, .job = digest}};
+  return shortened(walk(digest, job, *task));
+}
+
+std::vector<Cause> Reasons::of_task(const Digest& digest, TaskIndex task) const {
+  const Scheduler::Job& job = *scheduler_.find_job(digest);
+  const bool is_task_open = is_open(job.tasks.book().status(task));
+  if (const auto end = end_of(digest, job); end && is_task_open) return {*end};
+  return shortened(walk(digest, job, task));
+}
+
+std::vector<Cause> Reasons::of_worker(const std::string& worker) const {
+  const LeaseBook& leases = scheduler_.leases();
+  if (!leases.knows(worker)) return {{.kind = ReasonKind::gone}};
+  Chain chain;
+  for (const LeaseBook::Place& place : leases.of_worker(worker))
+    chain.push_back(lease_of(leases.at(place)));
+  if (draining_.contains(worker))
+    chain.push_back({.kind = ReasonKind::draining, .workers = {worker}});
+  if (!chain.empty()) return chain;
+  for (const Digest& digest : scheduler_.in_turn()) {
+    if (chain.size() >= kMostShown) break;
+    const Scheduler::Job& job = *scheduler_.find_job(digest);
+    if (const auto cause = refusal(worker, digest, job)) {
+      chain.push_back(*cause);
+    } else if (const auto task = chosen_for(worker, job)) {
+      explain_free(digest, job, *task, worker, chain);
+    } else {
+      std::ranges::copy(of_job(digest), std::back_inserter(chain));
+    }
+  }
+  if (chain.empty()) chain.push_back({.kind = ReasonKind::no_job, .workers = {worker}});
+  return chain;
+}
+
+/// What keeps the whole job; nullopt: its tasks decide.
+std::optional<Cause> Reasons::end_of(const Digest& digest, const Scheduler::Job& job) const {
+  if (!is_open(job.status))
+    return Cause{
+        .kind = ReasonKind::ended, .job = digest, .text = std::string(job_status_name(job.status))};
+  if (job.status == JobStatus::paused)
+    return Cause{.kind = ReasonKind::paused, .job = digest, .text = job.waits};
+  if (!job.waits.empty() && scheduler_.leases().any_of(digest) == nullptr)
+    return Cause{.kind = ReasonKind::disk, .job = digest, .text = job.waits};
+  return std::nullopt;
+}
+
+/// Goes from a task to what it needs, as far as that goes.
+Reasons::Chain Reasons::walk(const Digest& digest, const Scheduler::Job& job,
+                             TaskIndex task) const {
+  const JobGraph& graph = job.tasks.graph();
+  const Crew crew = job.crew(scheduler_.leases(), now_);
+  Chain chain;
+  std::set<TaskIndex> seen;
+  while (seen.insert(task).second) {
+    const TaskKey key = graph.key(task);
+    const TaskStatus status = job.tasks.book().status(task);
+    std::optional<TaskIndex> next;
+    if (status == TaskStatus::leased) {
+      chain.push_back(lease_of(scheduler_.leases().at({digest, task})));
+      return chain;
+    }
+    if (status == TaskStatus::blocked) {
+      next = furthest_input(job, task, crew);
+      if (next)
+        chain.push_back(
+            {.kind = ReasonKind::input, .job = digest, .task = key, .awaited = graph.key(*next)});
+    } else if (status == TaskStatus::ready) {
+      next = explain_ready(digest, job, task, chain);
+      if (!next) return chain;
+    }
+    if (!next) {
+      const char* const text = status == TaskStatus::done     ? "done"
+                               : status == TaskStatus::failed ? "failed"
+                                                              : "cancelled";
+      chain.push_back({.kind = ReasonKind::ended, .job = digest, .task = key, .text = text});
+      return chain;
+    }
+    task = *next;
+  }
+  chain.push_back({.kind = ReasonKind::asking,
+                   .job = digest,
+                   .task = graph.key(task),
+                   .workers = scheduler_.leases().alike(job.renderer)});
+  return chain;
+}
+
+/// Why nobody who is connected can have a ready task; nullopt: somebody can.
+std::optional<Cause> Reasons::nobody_for(const Digest& digest, const Scheduler::Job& job,
+                                         TaskIndex task) const {
+  const LeaseBook& leases = scheduler_.leases();
+  const TaskKey key = job.tasks.graph().key(task);
+  Cause cause{.kind = ReasonKind::no_worker, .job = digest, .task = key};
+  if (leases.connected().empty()) return cause;
+  const std::string renderer = renderer_of(digest, job, leases);
+  const std::vector<std::string>& alike = leases.alike(renderer);
+  if (alike.empty()) {
+    cause.kind = ReasonKind::renderer;
+    cause.text = renderer;
+    cause.workers = leases.connected();
+    return cause;
+  }
+  cause.workers = alike;
+  const Crew crew{alike, job.standings, now_};
+  const auto is_blind = [&](const auto& w) { return job.standings.is_blind(w, now_); };
+  if (std::ranges::all_of(alike, is_blind)) {
+    cause.kind = ReasonKind::blind;
+    cause.text = job.standings.unseen();
+    return cause;
+  }
+  if (job.rests_until.at(static_cast<std::size_t>(key.kind)) > now_) {
+    cause.kind = ReasonKind::disk;
+    cause.text = job.waits;
+    cause.workers.clear();
+    return cause;
+  }
+  if (!somebody_may_try(crew, job.tasks.attempts().blame(task))) {
+    cause.kind = ReasonKind::tried;
+    return cause;
+  }
+  if (std::ranges::all_of(alike,
+                          [&](const auto& w) { return draining_.contains(w) || is_blind(w); })) {
+    cause.kind = ReasonKind::draining;
+    return cause;
+  }
+  return std::nullopt;
+}
+
+/// Why a ready task is not granted. Returns another task of the job that explains it further.
+std::optional<TaskIndex> Reasons::explain_ready(const Digest& digest, const Scheduler::Job& job,
+                                                TaskIndex task, Chain& chain) const {
+  const LeaseBook& leases = scheduler_.leases();
+  const JobGraph& graph = job.tasks.graph();
+  const TaskKey key = graph.key(task);
+  if (const auto cause = nobody_for(digest, job, task)) {
+    chain.push_back(*cause);
+    return std::nullopt;
+  }
+  if (key.kind == TaskKind::render &&
+      key.run() > last_due_run(graph, job.tasks.book(), job.max_frames_ahead)) {
+    const std::optional<TaskIndex> first = earliest_open_task(job.tasks);
+    chain.push_back({.kind = ReasonKind::order,
+                     .job = digest,
+                     .task = key,
+                     .awaited = first ? std::optional(graph.key(*first)) : std::nullopt});
+    return first;
+  }
+
+  // Who could do it, and what keeps the others from it.
+  const Crew crew = job.crew(leases, now_);
+  std::vector<std::string> able;
+  const std::vector<std::string>& alike = leases.alike(renderer_of(digest, job, leases));
+  for (const std::string& worker : alike) {
+    if (const auto cause = refusal(worker, digest, job)) {
+      chain.push_back(*cause);
+      chain.back().kind = ReasonKind::left_out;
+      chain.back().text = cause->kind == ReasonKind::renderer
+                              ? "does not render with " + cause->text
+                          : cause->kind == ReasonKind::blind ? "does not see " + cause->text
+                                                             : "rests from it after failures";
+    } else if (!draining_.contains(worker) && job.is_due(task, worker, crew)) {
+      able.push_back(worker);
+    }
+  }
+  if (able.empty()) {
+    chain.push_back({.kind = ReasonKind::tried, .job = digest, .task = key, .workers = alike});
+    return std::nullopt;
+  }
+  std::vector<std::string> readers = able;
+  std::erase_if(readers, [&](const auto& w) { return !can_read(job.tasks, task, w); });
+  if (readers.empty()) {
+    for (const auto& [holder, state] : held_inputs(job.tasks, task)) {
+      if (std::ranges::find(readers, holder) == readers.end() && leases.knows(holder))
+        readers.push_back(holder);
+    }
+    chain.push_back({.kind = ReasonKind::held, .job = digest, .task = key, .workers = readers});
+    if (readers.empty()) readers = able;
+  }
+  const auto free = std::ranges::find_if(
+      readers, [&](const auto& w) { return leases.wants(w) || leases.of_worker(w).empty(); });
+  if (free != readers.end()) {
+    explain_free(digest, job, task, *free, chain);
+  } else {
+    explain_busy(digest, key, readers, chain);
+  }
+  return std::nullopt;
+}
+
+/// The task of the job that the worker would be granted next.
+std::optional<TaskIndex> Reasons::chosen_for(const std::string& worker,
+                                             const Scheduler::Job& job) const {
+  const JobGraph& graph = job.tasks.graph();
+  const TaskBook& book = job.tasks.book();
+  const Crew crew = job.crew(scheduler_.leases(), now_);
+  return job.homes.choose(graph, book.ready(), last_due_run(graph, book, job.max_frames_ahead),
+                          worker, [&](TaskIndex ready) {
+                            return job.is_due(ready, worker, crew) &&
+                                   can_read(job.tasks, ready, worker);
+                          });
+}
+
+/// Why a worker that has nothing to do, or wants more, is not granted a task.
+void Reasons::explain_free(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
+                           const std::string& worker, Chain& chain) const {
+  const JobGraph& graph = job.tasks.graph();
+  const std::optional<TaskIndex> chosen = chosen_for(worker, job);
+  if (chosen && *chosen != task) {
+    chain.push_back({.kind = ReasonKind::order,
+                     .job = digest,
+                     .task = graph.key(task),
+                     .awaited = graph.key(*chosen)});
+    task = *chosen;
+  }
+  bool others_wait = false;
+  for (const Digest& before : scheduler_.in_turn()) {
+    if (before == digest) break;
+    const Scheduler::Job& other = *scheduler_.find_job(before);
+    const std::set<TaskIndex>& ready = other.tasks.book().ready();
+    others_wait |= !ready.empty() && !scheduler_.has_room_for(other, *ready.begin(), false);
+  }
+  Cause cause{.kind = ReasonKind::asking, .job = digest, .task = graph.key(task)};
+  if (scheduler_.has_room_for(job, task, others_wait)) {
+    cause.workers = {worker};
+  } else {
+    const StoreRoom room = scheduler_.room();
+    cause.kind = ReasonKind::store;
+    cause.need_bytes = job.sizes.largest(graph, graph.key(task));
+    const std::uint64_t taken = room.used + room.expected;
+    cause.free_bytes = room.limit > taken ? room.limit - taken : 0;
+  }
+  chain.push_back(std::move(cause));
+}
+
+/// All workers that could do a task have others.
+void Reasons::explain_busy(const Digest& digest, const TaskKey& task,
+                           const std::vector<std::string>& workers, Chain& chain) const {
+  const LeaseBook& leases = scheduler_.leases();
+  Cause busy{.kind = ReasonKind::busy, .job = digest, .task = task};
+  const Lease* oldest = nullptr;
+  for (const std::string& worker : workers) {
+    busy.workers.push_back(worker);
+    for (const LeaseBook::Place& place : leases.of_worker(worker)) {
+      const Lease& lease = leases.at(place);
+      if (oldest == nullptr || lease.granted_at < oldest->granted_at) oldest = &lease;
+      if (std::ranges::find(busy.jobs, place.first) == busy.jobs.end())
+        busy.jobs.push_back(place.first);
+    }
+  }
+  const Cause end = lease_of(*oldest);
+  chain.push_back(std::move(busy));
+  chain.push_back(end);
+}
+
+Cause Reasons::lease_of(const Lease& lease) const {
+  return {.kind = ReasonKind::running,
+          .job = lease.id.job,
+          .task = lease.id.task,
+          .workers = {lease.worker},
+          .since = lease.granted_at};
+}
+
+/// Why the worker gets nothing of the job, whatever is ready; nullopt: it may.
+std::optional<Cause> Reasons::refusal(const std::string& worker, const Digest& digest,
+                                      const Scheduler::Job& job) const {
+  const LeaseBook& leases = scheduler_.leases();
+  Cause cause{.kind = ReasonKind::renderer, .job = digest, .workers = {worker}};
+  const std::string renderer = renderer_of(digest, job, leases);
+  if (!leases.renders_as(worker, renderer)) {
+    cause.text = renderer;
+    return cause;
+  }
+  if (job.standings.is_blind(worker, now_)) {
+    cause.kind = ReasonKind::blind;
+    cause.text = job.standings.unseen_by(worker);
+    return cause;
+  }
+  if (rests(job.crew(leases, now_), worker)) {
+    cause.kind = ReasonKind::tried;
+    return cause;
+  }
+  return std::nullopt;
+}
+
+bool lacks_room(const Scheduler& scheduler, const Digest& digest) {
+  const Scheduler::Job& job = *scheduler.find_job(digest);
+  const std::set<TaskIndex>& ready = job.tasks.book().ready();
+  if (job.status != JobStatus::running || !scheduler.leases().empty() || ready.empty())
+    return false;
+  // Assembly makes room; its tasks come first.
+  for (const Digest& other : scheduler.in_turn()) {
+    const JobTasks& tasks = scheduler.find_job(other)->tasks;
+    if (!tasks.book().ready().empty() && *tasks.book().ready().begin() < tasks.graph().num_frames())
+      return false;
+  }
+  return !scheduler.has_room_for(job, *ready.begin(), false);
+}
+
+std::string waits_for(const Scheduler& scheduler, const Digest& digest, TimePoint now) {
+  const Scheduler::Job& job = *scheduler.find_job(digest);
+  const LeaseBook& leases = scheduler.leases();
+  if (!is_open(job.status) || !job.waits.empty()) return job.waits;
+  if (scheduler.lacks_renderer(digest)) {
+    return fmt::format(
+        "a worker that renders as what is done was rendered, with {}: those that are connected "
+        "render with {}, and pixels may differ. --restart renders all frames again, --from-frame N "
+        "those from N on; `baton-worker --isa` makes unlike machines alike",
+        job.renderer, leases.renderer_of(leases.connected().front()));
+  }
+  if (lacks_room(scheduler, digest)) return room_text(scheduler, job);
+  if (leases.connected().empty()) return {};
+  const Crew crew = job.crew(leases, now);
+  if (const std::string unseen = job.standings.unseen(); !unseen.empty() && are_all_blind(crew))
+    return fmt::format("a worker that sees {}", unseen);
+  for (const TaskIndex task : job.tasks.attempts().tried()) {
+    if (job.tasks.book().status(task) != TaskStatus::ready) continue;
+    if (!somebody_may_try(crew, job.tasks.attempts().blame(task)))
+      return fmt::format("a worker that can do {}: those that are connected have failed it or rest",
+                         place_text(place_of(job, job.tasks.graph().key(task))));
+  }
+  return {};
+}
+
+}  // namespace baton

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/job/activity.h"
+#include "coordinator/schedule/scheduler.h"
+
+namespace baton {
+
+/// One link of a chain of reasons. Workers that it names are connected.
+struct Cause {
+  ReasonKind kind = ReasonKind::input;
+  std::optional<Digest> job = {};
+  std::optional<TaskKey> task = {};
+  /// Of input and order: the task that comes first.
+  std::optional<TaskKey> awaited = {};
+  std::vector<std::string> workers = {};
+  /// A folder, a renderer, or what a disk said.
+  std::string text = {};
+  std::optional<TimePoint> since = {};  ///< when the task was granted
+  std::size_t count = 0;                ///< of links that are left out
+  /// Of busy: whose tasks the workers have, each once.
+  std::vector<Digest> jobs = {};
+  std::uint64_t need_bytes = 0, free_bytes = 0;
+};
+
+/// Why a scheduler does what it does, as chains of causes: from what somebody asks about to
+/// something that no other link explains (is_last). Pure: it reads the scheduler as it stands.
+class Reasons {
+ public:
+  /// scheduler: outlives the reasons, and does not change meanwhile. draining: workers that were
+  /// told to take nothing new.
+  Reasons(const Scheduler& scheduler, TimePoint now, std::set<std::string> draining = {})
+      : scheduler_(scheduler), now_(now), draining_(std::move(draining)) {}
+
+  /// Why the job, which must be known, is not further: of its first frame that is not written.
+  std::vector<Cause> of_job(const Digest& job) const;
+  /// Why the task of a job, which must be known, is not done.
+  std::vector<Cause> of_task(const Digest& job, TaskIndex task) const;
+  /// What the worker does, or why it does nothing.
+  std::vector<Cause> of_worker(const std::string& worker) const;
+
+ private:
+  using Chain = std::vector<Cause>;
+  std::optional<Cause> end_of(const Digest& digest, const Scheduler::Job& job) const;
+  Chain walk(const Digest& digest, const Scheduler::Job& job, TaskIndex task) const;
+  std::optional<TaskIndex> explain_ready(const Digest& digest, const Scheduler::Job& job,
+                                         TaskIndex task, Chain& chain) const;
+  std::optional<Cause> nobody_for(const Digest& digest, const Scheduler::Job& job,
+                                  TaskIndex task) const;
+  std::optional<TaskIndex> chosen_for(const std::string& worker, const Scheduler::Job& job) const;
+  void explain_free(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
+                    const std::string& worker, Chain& chain) const;
+  void explain_busy(const Digest& digest, const TaskKey& task,
+                    const std::vector<std::string>& workers, Chain& chain) const;
+  Cause lease_of(const Lease& lease) const;
+  std::optional<Cause> refusal(const std::string& worker, const Digest& digest,
+                               const Scheduler::Job& job) const;
+
+  const Scheduler& scheduler_;
+  TimePoint now_;
+  std::set<std::string> draining_;
+};
+
+/// What the job, which must be known, cannot go on without; empty: it goes on, or has ended. Of a
+/// job that failed although its tasks are done, what somebody must decide.
+std::string waits_for(const Scheduler& scheduler, const Digest& job, TimePoint now);
+
+/// Whether the store has no room for the next task of the job, which must be known, and nothing in
+/// work will make some.
+bool lacks_room(const Scheduler& scheduler, const Digest& job);
+
+}  // namespace baton

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/job/activity.h"
+#include "common/protocol/messages.h"
+
+namespace baton {
+
+/// What people often ask of the past, in memory: how long tasks take, who was lost, who changed a
+/// job last. It is told every event, in the order of time.
+class RecentPast {
+ public:
+  /// Tasks of a kind and job whose times are kept, the newest.
+  static constexpr std::size_t kMostTimes = 32;
+  /// The events that count.
+  static std::uint64_t kinds();
+
+  void add(const FarmEvent& event);
+
+  /// Of tasks of the kind and job that were done of late.
+  UsualTime usual(const JobId& job, TaskKind kind) const;
+  /// The event that last changed the job's status; nullptr: none is known.
+  const FarmEvent* last_change(const JobId& job) const;
+  /// Workers that were lost at this time or later and have not come again, the newest first.
+  std::vector<LostWorker> lost(std::int64_t since_ms) const;
+  /// Since when nobody is connected, as far as it is known; 0: it is not, or somebody is.
+  std::int64_t alone_since_ms() const { return connected_.empty() ? alone_since_ms_ : 0; }
+
+ private:
+  static constexpr std::size_t kMostLost = 1000;
+
+  std::map<JobId, std::array<std::deque<double>, 3>> times_;  ///< by TaskKind
+  std::map<JobId, FarmEvent> changes_;
+  std::map<std::string, FarmEvent> connected_;  ///< their arrivals
+  std::map<std::string, LostWorker> lost_;
+  std::int64_t alone_since_ms_ = 0;
+};
+
+}  // namespace baton

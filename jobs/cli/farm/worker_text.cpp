@@ -1,0 +1,109 @@
+#include "jobs/cli/farm/worker_text.h"
+
+#include <fmt/format.h>
+
+#include "jobs/cli/job_summary.h"
+#include "jobs/cli/text.h"
+
+namespace baton {
+
+using nlohmann::ordered_json;
+
+std::string task_time_text(double seconds) {
+  return seconds < 10 ? fmt::format("{:.1f}s", seconds) : duration_text(seconds);
+}
+
+std::string usual_text(const UsualTime& usual) {
+  return usual.count == 0 ? "" : fmt::format(" (usual {})", task_time_text(usual.median_s));
+}
+
+void add_usual(const UsualTime& usual, ordered_json& object) {
+  if (usual.count == 0) return;
+  object["usual"] = {
+      {"median", usual.median_s}, {"spread", usual.spread_s}, {"tasks", usual.count}};
+}
+
+std::string worker_lines(const WorkerSummary& worker) {
+  std::string text = fmt::format("{:<24}  {:<9}  {:>3} threads  {:>3} tasks  seen {} ago  {} on {}",
+                                 worker.worker_id, worker_activity_name(worker.activity),
+                                 worker.num_threads, worker.tasks.size(),
+                                 duration_text(worker.silent_s), worker.renderer, worker.host);
+  for (const TaskInHand& task : worker.tasks)
+    text += fmt::format("\n  job {}  {}  for {}{}", task.job.short_hex(), place_text(task.task),
+                        task_time_text(task.seconds), usual_text(task.usual));
+  for (const BlindSpot& blind : worker.blind)
+    text += fmt::format("\n  job {}  gets none of its tasks: does not see {}",
+                        blind.job.short_hex(), blind.folder.substr(0, blind.folder.find(": ")));
+  return text;
+}
+
+ordered_json worker_json(const WorkerSummary& worker) {
+  ordered_json tasks = ordered_json::array();
+  for (const TaskInHand& task : worker.tasks) {
+    ordered_json row = {{"job", task.job.hex()}};
+    row.update(place_json(task.task));
+    row["seconds"] = task.seconds;
+    add_usual(task.usual, row);
+    tasks.push_back(std::move(row));
+  }
+  ordered_json blind = ordered_json::array();
+  for (const BlindSpot& spot : worker.blind)
+    blind.push_back({{"job", spot.job.hex()}, {"folder", spot.folder}});
+  return {{"id", worker.worker_id},
+          {"activity", worker_activity_name(worker.activity)},
+          {"host", worker.host},
+          {"pid", worker.pid},
+          {"threads", worker.num_threads},
+          {"leases", worker.tasks.size()},
+          {"draining", worker.is_draining},
+          {"secondsSilent", worker.silent_s},
+          {"build", worker.build},
+          {"renderer", worker.renderer},
+          {"tasks", std::move(tasks)},
+          {"blindTo", std::move(blind)}};
+}
+
+std::string lost_line(const LostWorker& worker) {
+  return fmt::format(
+      "{:<24}  lost       {}, after {}  {}", worker.worker_id, utc_text(worker.lost_ms),
+      worker.joined_ms == 0
+          ? std::string("-")
+          : duration_text(static_cast<double>(worker.lost_ms - worker.joined_ms) / 1000),
+      worker.about);
+}
+
+ordered_json lost_json(const LostWorker& worker) {
+  return {{"id", worker.worker_id},
+          {"activity", "lost"},
+          {"joined", utc_json(worker.joined_ms)},
+          {"lost", utc_json(worker.lost_ms)},
+          {"about", worker.about}};
+}
+
+std::string reason_line(const Reason& reason) {
+  std::string text = reason.text;
+  if (reason.seconds > 0)
+    text += fmt::format(" for {}{}", task_time_text(reason.seconds), usual_text(reason.usual));
+  if (reason.since_ms > 0) text += fmt::format(", since {}", utc_text(reason.since_ms));
+  return text;
+}
+
+ordered_json reason_json(const Reason& reason) {
+  ordered_json row = {{"kind", reason_kind_name(reason.kind)}, {"text", reason.text}};
+  if (!reason.job.empty()) row["job"] = reason.job.hex();
+  if (reason.has_task) {
+    row.update(place_json(reason.task));
+    row.erase("attempt");
+  }
+  if (!reason.workers.empty()) row["workers"] = reason.workers;
+  if (reason.seconds > 0) row["seconds"] = reason.seconds;
+  add_usual(reason.usual, row);
+  if (reason.since_ms > 0) row["since"] = utc_iso(reason.since_ms);
+  if (reason.need_bytes > 0) {
+    row["needBytes"] = reason.need_bytes;
+    row["freeBytes"] = reason.free_bytes;
+  }
+  return row;
+}
+
+}  // namespace baton
