@@ -21,10 +21,10 @@ from pathlib import Path
 from chaos_jobs import FOREIGN_ISA, KINDS, Job, Undisturbed, edits_of
 from farm import OK, PATIENCE, Farm, Fault, Programs, check, wait_until
 
-EDITS, END_S = 5, 120 * PATIENCE
+EDITS, END_S = 5, 300 * PATIENCE
 AT_ONCE = 4  # sequences on one farm
 ISAS = ("auto", FOREIGN_ISA)
-SWITCH_S = (0.5, 4)  # from one kind of workers to the other
+SWITCH_S = (1, 8)  # from one kind of workers to the other
 NUM_WORKERS = 2
 
 

@@ -6,6 +6,7 @@
 #include "common/image/film_tile.h"
 #include "common/image/frame_seal.h"
 #include "common/image/image_io.h"
+#include "common/store/frame_locks.h"
 
 namespace baton {
 namespace {
@@ -16,6 +17,7 @@ struct FramePlaceTest : testing::Test {
   const fs::path folder = fs::path(testing::TempDir()) / "frame_place";
   const fs::path frame = folder / "beauty.0001.exr";
   const Digest made = digest_of("frame");
+  static constexpr JobId kJob{7};
 
   void SetUp() override {
     fs::remove_all(folder);
@@ -32,19 +34,21 @@ struct FramePlaceTest : testing::Test {
     return digest_of(read_file(frame, 1 << 20).value());
   }
   std::optional<PictureInPlace> find(const std::vector<Digest>& may_replace = {}) const {
-    return find_picture_in_place(frame, made, may_replace).value();
+    return look_at_place(frame, made, may_replace, kJob).value().stays;
   }
 };
 
 TEST_F(FramePlaceTest, OnlyAWholePictureOfOthersStays) {
   EXPECT_FALSE(find()) << "nothing is there";
+  EXPECT_TRUE(look_at_place(frame, made, {}, kJob).value().is_free);
   const Digest there = put_picture(0.5f, "0123");
   ASSERT_TRUE(find());
   EXPECT_EQ(find()->digest, there);
   EXPECT_EQ(find()->writer, "0123");
   EXPECT_TRUE(find({digest_of("another")}));
   EXPECT_FALSE(find({digest_of("another"), there}));
-  EXPECT_FALSE(find_picture_in_place(frame, there, {}).value()) << "the same bytes";
+  EXPECT_FALSE(look_at_place(frame, there, {}, kJob).value().stays) << "the same bytes";
+  EXPECT_FALSE(look_at_place(frame, there, {}, kJob).value().is_free);
 
   fs::resize_file(frame, fs::file_size(frame) / 2);
   EXPECT_FALSE(find()) << "cut";
@@ -54,9 +58,28 @@ TEST_F(FramePlaceTest, OnlyAWholePictureOfOthersStays) {
 
 TEST_F(FramePlaceTest, WhatCannotBeReadIsAnError) {
   fs::create_directories(frame);
-  const auto found = find_picture_in_place(frame, made, {});
+  const auto found = look_at_place(frame, made, {}, kJob);
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().kind, ErrorKind::io) << "it may pass";
+}
+
+// Whatever the coordinator says, which may not know the other one.
+TEST_F(FramePlaceTest, WhatOthersHaveLockedStays) {
+  const Digest there = put_picture(0.5f, "0123");
+  const std::string name = frame.filename().string();
+  ASSERT_TRUE(record_locks(folder, kJob.hex(), {name}));
+  EXPECT_FALSE(find({there})) << "its own lock";
+  ASSERT_TRUE(record_locks(folder, JobId{8}.hex(), {"another.exr", name}));
+  EXPECT_TRUE(find({there}));
+  ASSERT_TRUE(record_locks(folder, JobId{8}.hex(), {}));
+  EXPECT_FALSE(find({there}));
+  ASSERT_TRUE(record_locks(folder, kJob.hex(), {}));
+  EXPECT_FALSE(fs::exists(lock_file(folder)));
+
+  ASSERT_TRUE(write_file_atomic(lock_file(folder), as_bytes_view("?")));
+  const auto unknown = look_at_place(frame, made, {there}, kJob);
+  ASSERT_FALSE(unknown) << "nothing is replaced while locks cannot be read";
+  EXPECT_FALSE(record_locks(folder, kJob.hex(), {name})) << "and what is none of ours stays";
 }
 
 }  // namespace
