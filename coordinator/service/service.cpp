@@ -36,6 +36,14 @@ Status check_leases(const std::vector<LeaseId>& running) {
 /// As Scheduler::Job::renderer has it.
 std::string renderer_of(const WorkerHello& hello) { return hello.renderer + ", " + hello.build; }
 
+/// hindrance: what the coordinator sees; why: what the worker said.
+Status wait_for_disk(FarmCore& farm, const std::string& worker, const LeaseId& lease,
+                     const std::string& hindrance, const std::string& why) {
+  const std::string waits = fmt::format("{}: {}", hindrance, why.substr(0, limits::kMaxTextLength));
+  spdlog::warn("job {} waits for {}", farm.history.name_of(lease.job), waits);
+  return farm.step(SpaceLacking{worker, lease, waits});
+}
+
 }  // namespace
 
 // ---- the loop -----------------------------------------------------------------------------------
@@ -255,7 +263,7 @@ Status Service::receive_from(const std::string& worker, const TaskFailed& messag
       message.no_space ? "space" : find_hindrance(farm_, message.lease);
   if (!hindrance && await_inputs(worker, message)) return {};
   BATON_TRY(farm_.reply_to(worker, ReportReceived{message.lease}));
-  if (hindrance) return wait_for_disk(worker, message.lease, *hindrance, message.message);
+  if (hindrance) return wait_for_disk(farm_, worker, message.lease, *hindrance, message.message);
   // Inputs that are gone, damaged or cannot be read are nobody's fault: what made them is done
   // again.
   const std::optional<std::vector<BlobRef>> bad = find_bad_inputs(farm_, files_, message.lease);
@@ -279,14 +287,6 @@ Status Service::receive_from(const std::string& worker, const StatesPublished& m
   return farm_.step(HeldPublished{worker, message.job, std::move(states)});
 }
 
-/// hindrance: what the coordinator sees; why: what the worker said.
-Status Service::wait_for_disk(const std::string& worker, const LeaseId& lease,
-                              const std::string& hindrance, const std::string& why) {
-  const std::string waits = fmt::format("{}: {}", hindrance, why.substr(0, limits::kMaxTextLength));
-  spdlog::warn("job {} waits for {}", farm_.history.name_of(lease.job), waits);
-  return farm_.step(SpaceLacking{worker, lease, waits});
-}
-
 Status Service::receive_from(const std::string& worker, const LeaseReturn& message) {
   if (!message.not_held.empty()) {
     std::vector<BlobRef> gone = message.not_held;
@@ -296,7 +296,7 @@ Status Service::receive_from(const std::string& worker, const LeaseReturn& messa
   if (message.in_place != Digest()) return judge_place(worker, message);
   const auto hindrance =
       message.unseen.empty() ? std::nullopt : find_hindrance(farm_, message.lease);
-  if (hindrance) return wait_for_disk(worker, message.lease, *hindrance, message.unseen);
+  if (hindrance) return wait_for_disk(farm_, worker, message.lease, *hindrance, message.unseen);
   const std::string unseen = message.unseen.substr(0, limits::kMaxTextLength);
   if (!unseen.empty())
     tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,

@@ -52,8 +52,6 @@ class Service {
   Status receive(const PeerId& peer, const WorkerHello& message);
   std::optional<std::string> other_build(const WorkerHello& hello) const;
   bool may_be_alone_soon(const WorkerHello& hello);
-  Status wait_for_disk(const std::string& worker, const LeaseId& lease,
-                       const std::string& hindrance, const std::string& why);
   Status receive_from(const std::string& worker, const LeaseRequest& message);
   Status receive_from(const std::string& worker, const Heartbeat& message);
   Status receive_from(const std::string& worker, const TaskDone& message);
