@@ -12,7 +12,7 @@ namespace baton {
 namespace {
 
 /// Files by job.
-using Locks = std::map<std::string, std::vector<std::string>>;
+using Locks = std::map<std::string, std::set<std::string>>;
 constexpr std::uint64_t kMaxBytes = 64 << 20;
 constexpr std::size_t kIdLength = 16;
 
@@ -30,7 +30,7 @@ Result<Locks> read_locks(const std::filesystem::path& file) {
                                "has locked: mend it, or remove it, and nothing is locked by others",
                                file.string())};
     }
-    locks[line.substr(0, kIdLength)].push_back(line.substr(kIdLength + 1));
+    locks[line.substr(0, kIdLength)].insert(line.substr(kIdLength + 1));
   }
   return locks;
 }
@@ -42,7 +42,7 @@ std::filesystem::path lock_file(const std::filesystem::path& folder) {
 }
 
 Status record_locks(const std::filesystem::path& folder, const std::string& job,
-                    const std::vector<std::string>& files) {
+                    const std::set<std::string>& files) {
   const std::filesystem::path file = lock_file(folder);
   BATON_ASSIGN(Locks locks, read_locks(file));
   const Locks before = locks;

@@ -2,8 +2,8 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
-#include <vector>
 
 #include "common/base/result.h"
 
@@ -17,7 +17,7 @@ std::filesystem::path lock_file(const std::filesystem::path& folder);
 /// Replaces what the folder's file says of a job, which is named by its ID; without anything to say
 /// the file goes. Errors: the disk; corrupt, the file is none of ours, and stays as it is.
 Status record_locks(const std::filesystem::path& folder, const std::string& job,
-                    const std::vector<std::string>& files);
+                    const std::set<std::string>& files);
 
 /// Names of the files that are locked by other jobs than `job`, and by which. Errors as above.
 Result<std::map<std::string, std::string>> locks_of_others(const std::filesystem::path& folder,

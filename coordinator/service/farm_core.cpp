@@ -137,15 +137,16 @@ Result<std::optional<JobDetail>> FarmCore::archived_detail(const Digest& job) {
   return std::optional(std::move(detail));
 }
 
-Result<bool> FarmCore::explain_ended(const Digest& job, const std::string& reason,
-                                     bool done_counts) {
+Result<bool> FarmCore::ended_by_frames(const Digest& job, const std::string& reason,
+                                       bool done_counts) {
   BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
   if (!detail) return false;
   JobSummary& summary = detail->summary;
   const bool has_failed = summary.status == JobStatus::failed && summary.tasks_failed == 0;
   const bool was_done = summary.status == JobStatus::done;
   if (!has_failed && !(was_done && done_counts)) return false;
-  if (!reason.empty() && was_done) {
+  if (reason.empty()) return true;
+  if (was_done) {
     summary.status = JobStatus::failed;
     BATON_TRY(history.status_changed(job, summary.status, reason));
   }

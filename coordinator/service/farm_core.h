@@ -136,9 +136,9 @@ class FarmCore {
   Result<JobDetail> living_detail(const Digest& job);
   /// Describes a job of the archive; nullopt: it is not there.
   Result<std::optional<JobDetail>> archived_detail(const Digest& job);
-  /// A job that has failed for its frames alone, or was done where that counts, has failed for this
-  /// reason; empty: it stays as it is, but for one that it had. Returns whether it is such a job.
-  Result<bool> explain_ended(const Digest& job, const std::string& reason, bool done_counts);
+  /// Whether a job has failed for its frames alone, or was done where that counts. One that is has
+  /// failed for this reason from now on; empty: it stays as it is.
+  Result<bool> ended_by_frames(const Digest& job, const std::string& reason, bool done_counts);
 
  private:
   // Actions of the scheduler.

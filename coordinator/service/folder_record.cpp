@@ -167,4 +167,8 @@ std::string doubt_text(const FramesInDoubt& doubt, const JobId& job) {
   return text;
 }
 
+std::string fault_text(const OddFrames& odd, const JobId& job) {
+  return odd.unreadable.empty() ? doubt_text(odd.doubt, job) : odd.unreadable;
+}
+
 }  // namespace baton

@@ -77,6 +77,8 @@ struct OddFrames {
   /// Why one of them cannot be read; empty: none is.
   std::string unreadable;
 };
+/// For people: what is wrong with them; empty: nothing.
+std::string fault_text(const OddFrames& odd, const JobId& job);
 OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& spec,
                           const LockedFrames& locked);
 

@@ -69,19 +69,23 @@ Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
   return places;
 }
 
+std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNumber>& frames) {
+  std::set<std::string> files;
+  for (const FrameNumber frame : frames)
+    files.insert(frame_file_name(spec.output.pattern, frame.value()));
+  return files;
+}
+
 void tell_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id,
                 const Roots& roots) {
   if (!check_output_root(spec, roots)) return;
-  std::vector<std::string> files;
-  for (const FrameNumber frame : jobs.locked(id))
-    files.push_back(frame_file_name(spec.output.pattern, frame.value()));
-  const Status written = record_locks(spec.output.directory, id.hex(), files);
+  const Status written =
+      record_locks(spec.output.directory, id.hex(), frame_files(spec, jobs.locked(id)));
   if (!written)
     spdlog::warn("locks are not known to other coordinators: {}", written.error().message);
 }
 
-Result<LockedFrames> locked_elsewhere(const JobSpec& spec, const IdentityBook& jobs,
-                                      const JobId& id) {
+Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id) {
   const auto locks = locks_of_others(spec.output.directory, id.hex());
   if (!locks) return Error{ErrorKind::io, locks.error().message};
   std::vector<FrameNumber> frames;
@@ -91,8 +95,14 @@ Result<LockedFrames> locked_elsewhere(const JobSpec& spec, const IdentityBook& j
     const std::optional<JobId> other = JobId::from_hex(lock->second);
     if (!other || jobs.versions(*other).empty()) frames.push_back(frame);
   }
-  std::ranges::sort(frames);
-  return LockedFrames(spec, frames);
+  if (frames.empty()) return {};
+  return Error{
+      ErrorKind::bad_input,
+      fmt::format("job '{}': frames {} in {} are locked by a job of another coordinator, and stay: "
+                  "unlock them there or, if it is gone, remove {}; another output.directory keeps "
+                  "them",
+                  spec.name, format_frames(frames), spec.output.directory,
+                  lock_file(spec.output.directory).string())};
 }
 
 Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,

@@ -39,13 +39,14 @@ std::string locked_text(const JobSpec& spec, const LockedFrames& locked);
 Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
                                                const std::vector<FrameNumber>& frames,
                                                const Scheduler::Job* job);
+/// Names of the files of frames, in the job's folder.
+std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNumber>& frames);
 /// Writes the locks of a job into its output folder, for other coordinators; where that cannot be
 /// written, they do not learn of them.
 void tell_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id, const Roots& roots);
-/// Which frames of a job jobs have locked that only another coordinator knows. Errors, io: what the
-/// folder says of that cannot be read.
-Result<LockedFrames> locked_elsewhere(const JobSpec& spec, const IdentityBook& jobs,
-                                      const JobId& id);
+/// Errors: bad_input, jobs have locked frames of this one that only another coordinator knows; io,
+/// what the folder says of that cannot be read.
+Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id);
 /// Error (bad_input): some of these frames are not among those that are locked in the job.
 Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,
                      const std::vector<FrameNumber>& frames);

@@ -69,24 +69,26 @@ class Service {
   void tell_refusals();
   void tell(const std::string& warning);
 
-  // Questions of anybody (service_jobs.cpp).
+  // What people, and workers, do with jobs (service_jobs.cpp).
   Status receive(const PeerId& peer, const JobDocumentRequest& message);
   Status receive(const PeerId& peer, const SubmitJob& message);
-  Status receive(const PeerId& peer, const ListJobs& message);
-  Status receive(const PeerId& peer, const ShowJob& message);
   Status receive(const PeerId& peer, const CancelJob& message);
   Status receive(const PeerId& peer, const PauseJob& message);
   Status receive(const PeerId& peer, const ResumeJob& message);
   Status receive(const PeerId& peer, const LockFrames& message);
   Status receive(const PeerId& peer, const SetPriority& message);
-  Status receive(const PeerId& peer, const AskWhy& message);
-  Status receive(const PeerId& peer, const ListTasks& message);
   Status receive(const PeerId& peer, const DeleteJob& message);
   Status receive(const PeerId& peer, const DrainWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
-  Status receive(const PeerId& peer, const ListEvents& message);
   template <class E>
   Status change_job(const PeerId& peer, const std::string& prefix);
+
+  // What is asked (service_questions.cpp).
+  Status receive(const PeerId& peer, const ListJobs& message);
+  Status receive(const PeerId& peer, const ShowJob& message);
+  Status receive(const PeerId& peer, const AskWhy& message);
+  Status receive(const PeerId& peer, const ListTasks& message);
+  Status receive(const PeerId& peer, const ListEvents& message);
   Status answer_detail(const PeerId& peer, const Digest& job, std::string plan = {});
   Result<Digest> resolve(const std::string& text);
 

@@ -14,7 +14,6 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
-#include "common/store/frame_locks.h"
 #include "coordinator/service/answers.h"
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
@@ -154,7 +153,7 @@ Status Service::restore_job(const Digest& digest) {
   return {};
 }
 
-// ---- questions ----------------------------------------------------------------------------------
+// ---- what people do with jobs -------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
   if (const Status own = farm_.check_own(speaker_, message.job); !own)
@@ -199,31 +198,19 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   if (const Status folder = expect_folder(document->job.output.directory); !folder)
     return farm_.refuse(peer, folder.error());
   BATON_ASSIGN(const JobId id, submission.known_job(*document));
-  const Result<LockedFrames> elsewhere = locked_elsewhere(document->job, farm_.history.jobs(), id);
-  if (!elsewhere) return farm_.refuse(peer, elsewhere.error());
-  if (!elsewhere->frames().empty()) {
-    return farm_.refuse(
-        peer,
-        {ErrorKind::bad_input,
-         fmt::format("job '{}': frames {} in {} are locked by a job of another coordinator, and "
-                     "stay: unlock them there or, if it is gone, remove {}; another "
-                     "output.directory keeps them",
-                     document->job.name, format_frames(elsewhere->numbers(document->job)),
-                     document->job.output.directory,
-                     lock_file(document->job.output.directory).string())});
-  }
+  const Status free = expect_no_strange_locks(document->job, farm_.history.jobs(), id);
+  if (!free) return farm_.refuse(peer, free.error());
   const LockedFrames locked(document->job, farm_.history.jobs().locked(id));
   BATON_ASSIGN(const std::optional<OddFrames> odd,
                await_frames(peer, message, {document->digest, id}, document->job, locked));
   if (!odd) return {};
   const Scheduler::Job* const known = farm_.scheduler.find_job(document->digest);
   const bool runs = known != nullptr && known->status == JobStatus::running;
-  const std::string fault = odd->unreadable.empty() ? doubt_text(odd->doubt, id) : odd->unreadable;
+  const std::string fault = fault_text(*odd, id);
   const bool may_replace = message.restart && odd->doubt.locked_absent.empty();
   if (!odd->unreadable.empty() && !may_replace && !runs && may_pass(document->digest))
     return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + odd->unreadable});
   pass(document->digest);
-  if (!fault.empty() && peer.empty()) BATON_TRY(farm_.explain_ended(document->digest, fault, true));
   if (!fault.empty() && !may_replace && !runs)
     return farm_.refuse(peer,
                         {ErrorKind::io, fmt::format("job '{}': {}", document->job.name, fault)});
@@ -250,70 +237,6 @@ Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const
   if (!waits_->start(job, text, std::move(odd.unread), incoming, now))
     BATON_TRY(farm_.refuse(peer, {ErrorKind::timeout, text + ", after those of other jobs"}));
   return std::optional<OddFrames>();
-}
-
-Status Service::receive(const PeerId& peer, const ListJobs& message) {
-  const IdentityBook& known = farm_.history.jobs();
-  const Answers answers(farm_);
-  JobList list = answers.list_workers();
-  if (message.all) {
-    BATON_ASSIGN(const std::vector<Bytes> ended,
-                 farm_.journal.archived_summaries(limits::kMaxJobs));
-    for (const Bytes& bytes : ended) {
-      ArchiveReader reader(bytes);
-      ListedJob job;
-      reader(job.summary);
-      if (reader.complete() && known.is_newest(job.summary.version))
-        list.jobs.push_back(std::move(job));
-    }
-  }
-  std::uint64_t num_open = 0;
-  for (const Digest& version : farm_.scheduler.jobs()) {
-    const Scheduler::Job& job = *farm_.scheduler.find_job(version);
-    num_open += is_open(job.status) ? 1 : 0;
-    if (known.is_newest(version)) list.jobs.push_back({known.of(version), summarize(version, job)});
-  }
-  list.num_ended = known.num_jobs() - num_open;
-  for (ListedJob& job : list.jobs) {
-    job.identity = known.of(job.summary.version);
-    job.summary.owner = farm_.owner_of(job.summary.version);
-    job.now = answers.now_of(job.summary.version, job.summary.status);
-  }
-  return farm_.reply(peer, std::move(list));
-}
-
-Status Service::receive(const PeerId& peer, const ListEvents& message) {
-  EventQuery query = message.query;
-  query.count = std::clamp(query.count, 1, limits::kMaxEventsTold);
-  if (!message.job.empty()) {
-    const Result<Digest> version = resolve(message.job);
-    // One that was deleted is known to the history alone.
-    const std::optional<JobId> deleted = version ? std::nullopt : JobId::from_hex(message.job);
-    query.job = version ? farm_.history.jobs().of(*version).id : deleted.value_or(JobId());
-    BATON_ASSIGN(const auto any, farm_.journal.events({.job = query.job, .count = 1}));
-    if (!version && (!deleted || any.empty())) return farm_.refuse(peer, version.error());
-  }
-  EventList list;
-  BATON_ASSIGN(list.events, farm_.journal.events(query));
-  if (!query.job.empty()) {
-    BATON_ASSIGN(const auto sums, farm_.journal.event_sums(query.job));
-    for (const auto& [kind, sum] : sums) {
-      if (kind <= last_of(kind)) list.forgotten.push_back({kind, sum.count, sum.seconds});
-    }
-  }
-  return farm_.reply(peer, std::move(list));
-}
-
-Result<Digest> Service::resolve(const std::string& text) {
-  BATON_ASSIGN(const std::vector<FoundJob> found,
-               text.empty() ? std::vector<FoundJob>() : farm_.journal.find_jobs(text));
-  return choose_job(found, text);
-}
-
-Status Service::receive(const PeerId& peer, const ShowJob& message) {
-  const Result<Digest> job = resolve(message.job);
-  if (job) return answer_detail(peer, *job);
-  return farm_.refuse(peer, job.error());
 }
 
 Status Service::receive(const PeerId& peer, const CancelJob& message) {
@@ -380,17 +303,17 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
     places = std::move(found).value();
     std::ranges::set_union(before, frames, std::back_inserter(after));
   }
-  // Of a job that has ended it is told at once how its frames stand then.
+  // How the frames of a job that has ended stand then.
+  std::string fault;
   if (known == nullptr || !is_open(known->status)) {
-    BATON_ASSIGN(
-        const std::optional<OddFrames> odd,
-        await_frames(peer, message, {*job, id}, document->job, LockedFrames(document->job, after)));
+    const LockedFrames locked(document->job, after);
+    BATON_ASSIGN(const std::optional<OddFrames> odd,
+                 await_frames(peer, message, {*job, id}, document->job, locked));
     if (!odd) return {};
+    fault = fault_text(*odd, id);
   }
   BATON_TRY(farm_.history.locked(*job, frames, !message.off));
-  std::set<std::string> files;
-  for (const FrameNumber frame : frames)
-    files.insert(frame_file_name(document->job.output.pattern, frame.value()));
+  const std::set<std::string> files = frame_files(document->job, frames);
   BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return files.contains(file); }));
   spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
                message.off ? "unlocked" : "locked");
@@ -399,8 +322,9 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   tell_locks(document->job, farm_.history.jobs(), id, farm_.options.roots);
   // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
   // stand now.
-  BATON_ASSIGN(const bool is_looked_at, farm_.explain_ended(*job, {}, message.off));
-  if (is_looked_at) BATON_TRY(receive(PeerId(), SubmitJob{*text, false}));
+  BATON_ASSIGN(const bool ends_again, farm_.ended_by_frames(*job, fault, message.off));
+  if (ends_again && fault.empty())
+    BATON_TRY(Submission(farm_, files_, speaker_).submit(PeerId(), *document, {*text, false}, {}));
   return answer_detail(peer, *job);
 }
 
@@ -428,42 +352,6 @@ Status Service::receive(const PeerId& peer, const SetPriority& message) {
                                       {document->job.priority, message.priority}));
   BATON_TRY(farm_.step(PriorityChanged{*job, message.priority}));
   return answer_detail(peer, *job);
-}
-
-Status Service::receive(const PeerId& peer, const AskWhy& message) {
-  const Answers answers(farm_);
-  Result<ReasonChain> chain = ReasonChain();
-  if (message.job.empty()) {
-    chain = answers.why_worker(message.worker);
-  } else {
-    const Result<Digest> job = resolve(message.job);
-    if (!job) return farm_.refuse(peer, job.error());
-    const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
-    BATON_ASSIGN(const auto ended,
-                 known ? std::optional<JobDetail>() : farm_.archived_detail(*job));
-    chain = answers.why_job(*job, ended ? ended->summary.status : JobStatus::running, message);
-  }
-  if (!chain) return farm_.refuse(peer, chain.error());
-  return farm_.reply(peer, std::move(chain).value());
-}
-
-Status Service::receive(const PeerId& peer, const ListTasks& message) {
-  constexpr int kMostFailures = 100;
-  std::vector<Digest> jobs = farm_.scheduler.jobs();
-  if (!message.job.empty()) {
-    const Result<Digest> job = resolve(message.job);
-    if (!job) return farm_.refuse(peer, job.error());
-    jobs = {*job};
-  }
-  const Answers answers(farm_);
-  TaskList list;
-  for (const Digest& job : jobs) {
-    for (ListedTask& task : answers.tasks_in_hand(job)) list.tasks.push_back(std::move(task));
-    BATON_ASSIGN(const std::vector<Failure> failures,
-                 farm_.journal.recent_failures(job, kMostFailures));
-    for (const Failure& failure : failures) list.tasks.push_back(answers.failed_task(job, failure));
-  }
-  return farm_.reply(peer, std::move(list));
 }
 
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
@@ -523,33 +411,6 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
   if (!job) return farm_.refuse(peer, job.error());
   BATON_TRY(farm_.step(E{*job}));
   return answer_detail(peer, *job);
-}
-
-/// Describes a job that is known here or in the archive.
-Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
-  BATON_ASSIGN(JobGrowth growth, farm_.journal.growth(farm_.history.jobs().of(job).id));
-  if (farm_.scheduler.find_job(job) != nullptr) {
-    ShownJob shown{farm_.history.jobs().of(job), {}};
-    shown.growth = growth.said;
-    shown.locked = farm_.history.jobs().locked(shown.identity.id);
-    shown.lacks_renderer = farm_.scheduler.lacks_renderer(job);
-    BATON_ASSIGN(shown.detail, farm_.living_detail(job));
-    shown.detail.plan = std::move(plan);
-    shown.detail.summary.owner = farm_.owner_of(job);
-    shown.now = Answers(farm_).now_of(job, shown.detail.summary.status);
-    return farm_.reply(peer, std::move(shown));
-  }
-  BATON_ASSIGN(std::optional<JobDetail> detail, farm_.archived_detail(job));
-  if (!detail) {
-    return farm_.refuse(
-        peer, {ErrorKind::bad_input,
-               fmt::format("job {}: its document cannot be read", farm_.history.name_of(job))});
-  }
-  detail->summary.owner = farm_.owner_of(job);
-  const JobIdentity identity = farm_.history.jobs().of(job);
-  const JobNow now = Answers(farm_).now_of(job, detail->summary.status);
-  return farm_.reply(peer, ShownJob{identity, std::move(*detail), false, std::move(growth.said),
-                                    farm_.history.jobs().locked(identity.id), now});
 }
 
 }  // namespace baton

@@ -193,9 +193,7 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
   }
   BATON_TRY(farm_.history.submitted(document.digest, id, message.restart ? "restart" : ""));
   if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
-  std::set<std::string> files;
-  for (const FrameNumber frame : document.job.frames)
-    files.insert(frame_file_name(document.job.output.pattern, frame.value()));
+  const std::set<std::string> files = frame_files(document.job, document.job.frames);
   BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return !files.contains(file); }));
   BATON_TRY(begin_growth(document, message.restart));
   BATON_ASSIGN(std::vector<std::string> reasons, make_way(document, *others));

@@ -28,6 +28,7 @@ class Job:
 
     def __init__(self, kind, number, folder):
         self.kind, self.frames, self.number = kind, folder / "frames" / f"{kind}{number}", number
+        self.last = int(KINDS[kind]["frames"].split("-")[1])  # number of a frame
         self.path, self.edits = folder / f"{kind}{number}.json", {}
         self.id, self.versions, self.is_done = None, [], False
         self.written, self.blocked = [], []  # frames, and those in whose place there are folders
@@ -67,13 +68,12 @@ class Job:
 
 def edits_of(job, rng):
     """(what, keys of the job) of edits that the kind of job allows now."""
-    last = int(KINDS[job.kind]["frames"].split("-")[1])
     edits = [("tiles", {"image": {"tileSize": rng.choice([16, 32, 48])}, "priority": rng.randrange(100)}),
              ("pattern", {"output": {"pattern": rng.choice(["frame.####.exr", "shot_####.exr"])}}),
              ("AOVs", {"output": {"aovs": rng.choice([["depth"], ["normal", "depth"]])}})]
     sweeps = job.edits.get("quality", {}).get("sweeps", 1)
     if sweeps == 1:  # a later sweep begins with what the last frame hands on: other frames are another picture
-        edits += [("frames", {"frames": f"1-{number}"}) for number in (rng.randrange(2, last), last)]
+        edits += [("frames", {"frames": f"1-{number}"}) for number in (rng.randrange(2, job.last), job.last)]
     if job.kind == "motion" and sweeps < 3:
         edits.append(("sweeps", {"quality": {"sweeps": sweeps + 1, "refinable": True}}))
     return edits

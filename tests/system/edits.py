@@ -69,6 +69,8 @@ class Sequence:
         self.farm, self.workers, self.rng, self.diary = farm, workers, random.Random(seed), []
         self.job = Job(self.rng.choice(list(KINDS)), f"-{number}", farm.folder)
         self.next_at, self.waits_for_end = 0, False
+        # Every third one begins with versions of fewer frames by others, and of all again.
+        self.turn = 2 if number % 3 == 0 else 0
         self.left = EDITS
 
     def submit(self, *options):
@@ -78,12 +80,30 @@ class Sequence:
         check(self.job.id in (None, ident), f"{self}: another ID, {ident} after {self.job.id}")
         self.job.id = ident
 
+    def submit_turn(self):
+        """What the first workers made of the frames that the version of the others has not is of no use to the next version."""
+        is_first = self.turn == 2
+        if is_first:
+            self.workers.switch()
+            self.workers.wait_until_there()
+        self.job.edit(frames="1-2" if is_first else f"1-{self.job.last}")
+        self.submit(*(["--restart"] if is_first else []))
+        self.diary.append(f"turn {self.turn}")
+        self.turn -= 1
+        self.left -= 1
+        self.waits_for_end = True
+
     def tend(self):
         """Edits the job when it is time. Returns whether it has ended."""
         if time.monotonic() < self.next_at or (self.waits_for_end and self.farm.show(self.job.id)["status"] != "done"):
             return False
         if self.job.id is None:
             self.submit()
+            self.waits_for_end = self.turn > 0
+            return False
+        elif self.left > 0 and self.turn > 0:
+            self.submit_turn()
+            return False
         elif self.left > 0:
             what, settings = self.rng.choice(edits_of(self.job, self.rng))
             self.job.edit(**settings)

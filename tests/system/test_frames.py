@@ -73,22 +73,26 @@ def render_says_what_is_wrong(programs, folder):
     check_equal(sorted(programs.pixels(folder / "frames")), sorted(expected), "frames")
 
 
+def link_frames(place, name):
+    """The folder of frames is a link to `name` from now on."""
+    (place / name).mkdir(parents=True)
+    (place / "frames").symlink_to(place / name)
+
+
 def another_folder_is_not_the_folder(programs, folder):
     """Renamed, and an empty one in its place: the job pauses, and goes on when it is back."""
     expected = undisturbed(programs, folder)
     for name in ("gone", "empty", "another link", "another coordinator's"):
         place = folder / name.replace(" ", "-").replace("'", "")
         if name == "another link":
-            (place / "first").mkdir(parents=True)
-            (place / "frames").symlink_to(place / "first")
+            link_frames(place, "first")
         with Farm(programs, place / "farm") as farm:
             ident = begin(farm, place)
             (place / "frames").rename(place / "away")
             if name == "empty":
                 (place / "frames").mkdir()
             elif name == "another link":
-                (place / "second").mkdir()
-                (place / "frames").symlink_to(place / "second")
+                link_frames(place, "second")
             elif name == "another coordinator's":
                 (place / "frames").mkdir()
                 [mark] = (place / "away").glob(".baton-*")
@@ -116,14 +120,12 @@ def a_lost_folder_is_made_again_on_demand(programs, folder):
     for name in ("gone", "another link"):
         place = folder / name.replace(" ", "-")
         if name == "another link":
-            (place / "first").mkdir(parents=True)
-            (place / "frames").symlink_to(place / "first")
+            link_frames(place, "first")
         with Farm(programs, place / "farm") as farm:
             ident = begin(farm, place)
             (place / "frames").rename(place / "away")
             if name == "another link":
-                (place / "second").mkdir()
-                (place / "frames").symlink_to(place / "second")
+                link_frames(place, "second")
             farm.start_worker()
             wait_until(lambda: farm.show(ident)["status"] == "paused", "it is paused")
             farm.baton("job", "submit", place / "job.json", "--restart")

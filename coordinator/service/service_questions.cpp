@@ -1,0 +1,142 @@
+// What is asked of anybody: jobs, tasks, workers and events. Nothing changes by it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/archive.h"
+#include "common/base/limits.h"
+#include "coordinator/service/answers.h"
+#include "coordinator/service/job_report.h"
+#include "coordinator/service/service.h"
+
+namespace baton {
+
+Status Service::receive(const PeerId& peer, const ListJobs& message) {
+  const IdentityBook& known = farm_.history.jobs();
+  const Answers answers(farm_);
+  JobList list = answers.list_workers();
+  if (message.all) {
+    BATON_ASSIGN(const std::vector<Bytes> ended,
+                 farm_.journal.archived_summaries(limits::kMaxJobs));
+    for (const Bytes& bytes : ended) {
+      ArchiveReader reader(bytes);
+      ListedJob job;
+      reader(job.summary);
+      if (reader.complete() && known.is_newest(job.summary.version))
+        list.jobs.push_back(std::move(job));
+    }
+  }
+  std::uint64_t num_open = 0;
+  for (const Digest& version : farm_.scheduler.jobs()) {
+    const Scheduler::Job& job = *farm_.scheduler.find_job(version);
+    num_open += is_open(job.status) ? 1 : 0;
+    if (known.is_newest(version)) list.jobs.push_back({known.of(version), summarize(version, job)});
+  }
+  list.num_ended = known.num_jobs() - num_open;
+  for (ListedJob& job : list.jobs) {
+    job.identity = known.of(job.summary.version);
+    job.summary.owner = farm_.owner_of(job.summary.version);
+    job.now = answers.now_of(job.summary.version, job.summary.status);
+  }
+  return farm_.reply(peer, std::move(list));
+}
+
+Status Service::receive(const PeerId& peer, const ListEvents& message) {
+  EventQuery query = message.query;
+  query.count = std::clamp(query.count, 1, limits::kMaxEventsTold);
+  if (!message.job.empty()) {
+    const Result<Digest> version = resolve(message.job);
+    // One that was deleted is known to the history alone.
+    const std::optional<JobId> deleted = version ? std::nullopt : JobId::from_hex(message.job);
+    query.job = version ? farm_.history.jobs().of(*version).id : deleted.value_or(JobId());
+    BATON_ASSIGN(const auto any, farm_.journal.events({.job = query.job, .count = 1}));
+    if (!version && (!deleted || any.empty())) return farm_.refuse(peer, version.error());
+  }
+  EventList list;
+  BATON_ASSIGN(list.events, farm_.journal.events(query));
+  if (!query.job.empty()) {
+    BATON_ASSIGN(const auto sums, farm_.journal.event_sums(query.job));
+    for (const auto& [kind, sum] : sums) {
+      if (kind <= last_of(kind)) list.forgotten.push_back({kind, sum.count, sum.seconds});
+    }
+  }
+  return farm_.reply(peer, std::move(list));
+}
+
+Result<Digest> Service::resolve(const std::string& text) {
+  BATON_ASSIGN(const std::vector<FoundJob> found,
+               text.empty() ? std::vector<FoundJob>() : farm_.journal.find_jobs(text));
+  return choose_job(found, text);
+}
+
+Status Service::receive(const PeerId& peer, const ShowJob& message) {
+  const Result<Digest> job = resolve(message.job);
+  if (job) return answer_detail(peer, *job);
+  return farm_.refuse(peer, job.error());
+}
+
+Status Service::receive(const PeerId& peer, const AskWhy& message) {
+  const Answers answers(farm_);
+  Result<ReasonChain> chain = ReasonChain();
+  if (message.job.empty()) {
+    chain = answers.why_worker(message.worker);
+  } else {
+    const Result<Digest> job = resolve(message.job);
+    if (!job) return farm_.refuse(peer, job.error());
+    const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
+    BATON_ASSIGN(const auto ended,
+                 known ? std::optional<JobDetail>() : farm_.archived_detail(*job));
+    chain = answers.why_job(*job, ended ? ended->summary.status : JobStatus::running, message);
+  }
+  if (!chain) return farm_.refuse(peer, chain.error());
+  return farm_.reply(peer, std::move(chain).value());
+}
+
+Status Service::receive(const PeerId& peer, const ListTasks& message) {
+  constexpr int kMostFailures = 100;
+  std::vector<Digest> jobs = farm_.scheduler.jobs();
+  if (!message.job.empty()) {
+    const Result<Digest> job = resolve(message.job);
+    if (!job) return farm_.refuse(peer, job.error());
+    jobs = {*job};
+  }
+  const Answers answers(farm_);
+  TaskList list;
+  for (const Digest& job : jobs) {
+    for (ListedTask& task : answers.tasks_in_hand(job)) list.tasks.push_back(std::move(task));
+    BATON_ASSIGN(const std::vector<Failure> failures,
+                 farm_.journal.recent_failures(job, kMostFailures));
+    for (const Failure& failure : failures) list.tasks.push_back(answers.failed_task(job, failure));
+  }
+  return farm_.reply(peer, std::move(list));
+}
+
+/// Describes a job that is known here or in the archive.
+Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
+  BATON_ASSIGN(JobGrowth growth, farm_.journal.growth(farm_.history.jobs().of(job).id));
+  if (farm_.scheduler.find_job(job) != nullptr) {
+    ShownJob shown{farm_.history.jobs().of(job), {}};
+    shown.growth = growth.said;
+    shown.locked = farm_.history.jobs().locked(shown.identity.id);
+    shown.lacks_renderer = farm_.scheduler.lacks_renderer(job);
+    BATON_ASSIGN(shown.detail, farm_.living_detail(job));
+    shown.detail.plan = std::move(plan);
+    shown.detail.summary.owner = farm_.owner_of(job);
+    shown.now = Answers(farm_).now_of(job, shown.detail.summary.status);
+    return farm_.reply(peer, std::move(shown));
+  }
+  BATON_ASSIGN(std::optional<JobDetail> detail, farm_.archived_detail(job));
+  if (!detail) {
+    return farm_.refuse(
+        peer, {ErrorKind::bad_input,
+               fmt::format("job {}: its document cannot be read", farm_.history.name_of(job))});
+  }
+  detail->summary.owner = farm_.owner_of(job);
+  const JobIdentity identity = farm_.history.jobs().of(job);
+  const JobNow now = Answers(farm_).now_of(job, detail->summary.status);
+  return farm_.reply(peer, ShownJob{identity, std::move(*detail), false, std::move(growth.said),
+                                    farm_.history.jobs().locked(identity.id), now});
+}
+
+}  // namespace baton
