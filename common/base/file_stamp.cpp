@@ -12,7 +12,13 @@ namespace baton {
 Result<std::optional<FileStamp>> stamp_of(const std::filesystem::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
-    if (errno == ENOENT || errno == ENOTDIR) return std::optional<FileStamp>();
+    if (errno == ENOENT || errno == ENOTDIR) {
+      // Where a link leads may come back; the file that is there is not this one's absence.
+      struct stat link {};
+      if (::lstat(path.c_str(), &link) != 0) return std::optional<FileStamp>();
+      return Error{ErrorKind::bad_input,
+                   path.string() + ": is a link that leads nowhere, expected a file"};
+    }
     if (errno == ELOOP)
       return Error{ErrorKind::bad_input, path.string() + ": is a loop of links, expected a file"};
     return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), std::strerror(errno))};

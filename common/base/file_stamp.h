@@ -17,8 +17,8 @@ struct FileStamp {
   bool operator==(const FileStamp&) const = default;
 };
 
-/// nullopt: nothing has this name. Errors name the file: bad_input, it is a folder or no plain
-/// file; io, it cannot be looked at now.
+/// nullopt: nothing has this name. Errors name the file: bad_input, it is a folder, no plain
+/// file or a link that leads nowhere; io, it cannot be looked at now.
 Result<std::optional<FileStamp>> stamp_of(const std::filesystem::path& path);
 
 }  // namespace baton

@@ -70,6 +70,11 @@ class SqlDatabase {
   /// Opens or creates the file, write-ahead logged; a commit survives a power cut.
   static Result<SqlDatabase> open(const std::filesystem::path& path);
 
+  /// Takes room on the disk for what is committed next, 16 MiB or a fortieth of a smaller disk, so
+  /// that commits go on for a while on one that others have filled. Where the disk has none, or
+  /// does not promise any, nothing happens.
+  void reserve_room() const;
+
   /// Reads a table whole to see that its pages are sound.
   Status check(std::string_view table);
 

@@ -66,6 +66,7 @@ Result<Journal> Journal::open(const std::filesystem::path& path) {
   Journal journal(std::move(database));
   BATON_TRY(journal.prepare_schema());
   BATON_TRY(journal.count_start());
+  journal.database_.reserve_room();
   return journal;
 }
 
@@ -370,7 +371,9 @@ Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& t
 Status Journal::commit() {
   if (!in_transaction_) return {};
   in_transaction_ = false;
-  return database_.execute("COMMIT");
+  BATON_TRY(database_.execute("COMMIT"));
+  database_.reserve_room();
+  return {};
 }
 
 }  // namespace baton

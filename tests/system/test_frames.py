@@ -155,7 +155,8 @@ def a_frame_that_cannot_be_read_pauses_the_job(programs, folder):
 def what_is_no_file_in_the_place_of_a_frame_is_waited_for(programs, folder):
     expected = undisturbed(programs, folder)
     kinds = {"a folder": (Path.mkdir, Path.rmdir), "no plain file": (os.mkfifo, Path.unlink),
-             "a loop of links": (lambda path: path.symlink_to(path), Path.unlink)}
+             "a loop of links": (lambda path: path.symlink_to(path), Path.unlink),
+             "a link that leads nowhere": (lambda path: path.symlink_to("unmounted"), Path.unlink)}
     with Farm(programs, folder / "farm") as farm:
         for name, (put, remove) in kinds.items():
             place = folder / name.replace(" ", "-")

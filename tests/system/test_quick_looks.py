@@ -5,6 +5,7 @@ import re
 import subprocess
 
 from assets import write_map
+from exr_frames import read_frame
 from farm import BAD_INPUT, OK, USAGE, Process, check, check_equal, run_tests, wait_until
 from jobs import make_job, write_job
 from png_files import read_png, srgb
@@ -39,6 +40,19 @@ def test_a_look_leaves_finished_frames_alone(programs, folder):
     render(programs, job, "--frames", "3", "--set", "image.sites=4")
     same = render(programs, job, "--set", "sampling.numParticles=16", "--frames", "1-4")
     check(str(look) not in same.stdout + same.stderr, same.stdout + same.stderr)
+
+
+def test_a_look_replaces_looks_only(programs, folder):
+    """What another job or somebody has put into a folder of that name stays, until --restart makes it a folder of looks."""
+    job, other = job_at(folder), folder / "other"
+    programs.render(job_at(other, seed=3, output={"directory": str(folder / "frames-look")}), other / "work")
+    theirs = programs.pixels(folder / "frames-look")
+    look = ("render", job, "--work-dir", folder / "work", "--frames", "2", "--scale", ".5")
+    programs.refuses(*look, says=["frames-look", "no look has made that", "--restart", "--set output.directory"])
+    check_equal(programs.pixels(folder / "frames-look"), theirs, "frames of another job")
+    programs.run("baton", *look, "--restart", expect=OK)
+    programs.run("baton", *look[:-1], ".25", expect=OK)
+    check_equal(read_frame(folder / "frames-look/frame.0002.exr").width, 40, "width of the last look")
 
 
 def test_the_sheet_has_numbers_and_one_exposure(programs, folder):

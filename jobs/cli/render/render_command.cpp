@@ -24,7 +24,10 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   JobSpec& job = wanted.job;
   BATON_TRY(begin_at(job, options.from_frame));
   BATON_TRY(check_out(options, job));
-  if (wanted.is_look) spdlog::info("a look: frames go to {}", job.output.directory);
+  if (wanted.is_look) {
+    BATON_TRY(claim_look_folder(job.output.directory, options.restart));
+    spdlog::info("a look: frames go to {}", job.output.directory);
+  }
   const FarmOptions farm = farm_options(options, job);
   BATON_TRY(settle_method(job, farm));
 

@@ -72,6 +72,7 @@ Result<ExitCode> watch_and_render(const RenderOptions& options) {
     Result<WantedJob> version = load_settled(options.job, true);
     Status outcome = version ? check_out(options, version->job) : Status(version.error());
     if (outcome.ok()) outcome = settle_method(version->job, farm);
+    if (outcome.ok()) outcome = claim_look_folder(version->job.output.directory, options.restart);
     if (outcome.ok()) {
       spdlog::info("a look: frames go to {}", version->job.output.directory);
       const auto rendered = render_twice(session, version->job, interrupted);
