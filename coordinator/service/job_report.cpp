@@ -98,7 +98,7 @@ std::vector<std::string> lost_reasons(const LostFiles& lost) {
   std::vector<std::string> reasons;
   constexpr std::size_t kMost = 8;
   for (std::size_t i = 0; i < lost.frames.size() && i < kMost; ++i)
-    reasons.push_back(fmt::format("{} is gone, or not as it was written", lost.frames[i]));
+    reasons.push_back(fmt::format("{} is gone, or not as it was last written", lost.frames[i]));
   if (lost.frames.size() > kMost)
     reasons.push_back(fmt::format("and {} frames more", lost.frames.size() - kMost));
   const std::size_t blobs = lost.tasks.size() - std::min(lost.tasks.size(), lost.frames.size());

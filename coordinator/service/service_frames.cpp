@@ -111,7 +111,7 @@ Status Service::end_inspection(const FilesRead& read) {
         JobPaused{digest, fmt::format("{}: the output folder is not there", folder.string())});
 
   for (const std::string& file : found.lost_files)
-    spdlog::warn("job {}: {} is gone, or not as it was written, and is made again",
+    spdlog::warn("job {}: {} is gone, or not as it was last written, and is made again",
                  farm_.history.name_of(digest), file);
   if (!found.unreadable.empty()) {
     // The others are made again once it goes on.

@@ -354,7 +354,7 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   }
   constexpr std::size_t kMost = 8;
   for (std::size_t i = 0; i < adoption.lost.size() && i < kMost; ++i) {
-    reasons.push_back(fmt::format("{} is gone, or not as it was written",
+    reasons.push_back(fmt::format("{} is gone, or not as it was last written",
                                   frame_path(document.job, adoption.lost[i]).string()));
   }
   if (adoption.lost.size() > kMost)

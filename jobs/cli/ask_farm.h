@@ -2,6 +2,8 @@
 
 #include <chrono>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/local_farm.h"
@@ -20,7 +22,7 @@ Result<std::optional<A>> ask_farm(LocalFarm& farm, RequestClient& client, const 
   constexpr std::chrono::milliseconds kAnswerPatience{2000};
   const auto patience = std::chrono::seconds(farm.is_own() ? 60 : 300);
   auto end = std::chrono::steady_clock::now() + patience;
-  std::string printed;
+  std::set<std::string> printed;
   for (;;) {
     Result<A> answer = ask<A>(client, question, kAnswerPatience);
     if (answer) return std::optional<A>(std::move(answer).value());

@@ -23,9 +23,8 @@ void add_coordinator_options(CLI::App& command, CoordinatorLink& link) {
   command.add_flag("--insecure", link.insecure, "connect to another machine without a key");
 }
 
-void print_pending(const RequestClient& client, std::string& printed) {
-  const std::string before = std::exchange(printed, client.pending());
-  if (before != printed) fmt::print(stderr, "{}\n", printed);
+void print_pending(const RequestClient& client, std::set<std::string>& printed) {
+  if (printed.insert(client.pending()).second) fmt::print(stderr, "{}\n", client.pending());
 }
 
 ExitCode finish_with_coordinator(const Result<ExitCode>& outcome) {

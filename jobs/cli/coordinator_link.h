@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <set>
 #include <string>
 #include <thread>
 #include <variant>
@@ -35,13 +36,14 @@ Result<A> ask(RequestClient& client, const Message& question,
                "the coordinator answered with another message than was asked for"};
 }
 
-/// Prints what the coordinator is doing before it can answer, unless that was printed last.
-void print_pending(const RequestClient& client, std::string& printed);
+/// Prints what the coordinator is doing before it can answer, each line once: a bad disk gives two
+/// reasons by turns.
+void print_pending(const RequestClient& client, std::set<std::string>& printed);
 
 /// Like ask, and again for as long as the coordinator says that it is not done.
 template <class A>
 Result<A> ask_until_done(RequestClient& client, const Message& question) {
-  std::string printed;
+  std::set<std::string> printed;
   for (;;) {
     Result<A> answer = ask<A>(client, question);
     if (client.pending().empty()) return answer;

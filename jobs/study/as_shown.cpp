@@ -23,6 +23,42 @@ struct Mean {
   double value() const { return count > 0 ? sum / static_cast<double>(count) : 0; }
 };
 
+/// What errors of pixels come to.
+class Tally {
+ public:
+  explicit Tally(std::size_t num_blocks) : blocks_(num_blocks) {}
+
+  struct Pixel {
+    double squared = 0;    ///< its error; may be below zero
+    double deviation = 0;  ///< its size
+    double black = 0;      ///< 1: it is 0 and should not be
+  };
+  void add(const Pixel& pixel, std::size_t block, bool is_dark) {
+    all_.add(pixel.squared);
+    blocks_[block].add(pixel.squared);
+    if (is_dark) darkest_.add(pixel.squared);
+    deviations_.push_back(pixel.deviation);
+    black_.add(pixel.black);
+  }
+  ErrorAsShown total() {
+    ErrorAsShown error{.mse = all_.value(),
+                       .darkest_mse = darkest_.value(),
+                       .worst_block_mse = 0,
+                       .percentile_99_9 = quantile(std::move(deviations_), 0.999),
+                       .black = black_.value()};
+    for (const Mean& block : blocks_) {
+      if (block.count >= kFewestInNoiseBlock)
+        error.worst_block_mse = std::max(error.worst_block_mse, block.value());
+    }
+    return error;
+  }
+
+ private:
+  Mean all_, darkest_, black_;
+  std::vector<Mean> blocks_;
+  std::vector<double> deviations_;
+};
+
 }  // namespace
 
 ReferenceAsShown::ReferenceAsShown(const RgbImage& a, const RgbImage& b,
@@ -63,10 +99,25 @@ ReferenceAsShown::ReferenceAsShown(const RgbImage& a, const RgbImage& b,
   for (const double sum : brightness) is_dark_.push_back(sum <= dark ? 1 : 0);
 }
 
+ErrorAsShown ReferenceAsShown::noise_of_half() const {
+  Tally tally(num_blocks_);
+  for (std::size_t p = 0; p < pixels_.size(); ++p) {
+    double squared = 0;
+    std::array<bool, 2> is_black{true, true};
+    for (std::size_t k = 3 * p; k < 3 * p + 3; ++k) {
+      const double apart = double{half_[0][k]} - half_[1][k];
+      squared += 0.5 * apart * apart / 3;
+      for (std::size_t half = 0; half < 2; ++half)
+        is_black[half] = is_black[half] && !(half_[half][k] > 0);
+    }
+    tally.add({squared, std::sqrt(squared), is_black[0] != is_black[1] ? 0.5 : 0}, block_[p],
+              is_dark_[p] != 0);
+  }
+  return tally.total();
+}
+
 ErrorAsShown ReferenceAsShown::error_of(const RgbImage& test) const {
-  Mean all, darkest, black;
-  std::vector<Mean> blocks(num_blocks_);
-  std::vector<double> deviation;
+  Tally tally(num_blocks_);
   for (std::size_t p = 0; p < pixels_.size(); ++p) {
     double squared = 0, against_mean = 0;
     bool is_black = true;
@@ -78,22 +129,10 @@ ErrorAsShown ReferenceAsShown::error_of(const RgbImage& test) const {
       against_mean += (shown - 0.5 * (a + b)) * (shown - 0.5 * (a + b)) / 3;
       is_black = is_black && !(linear > 0);
     }
-    all.add(squared);
-    blocks[block_[p]].add(squared);
-    if (is_dark_[p] != 0) darkest.add(squared);
-    deviation.push_back(std::sqrt(against_mean));
-    black.add(is_black && is_black_[p] == 0 ? 1 : 0);
+    const double black = is_black && is_black_[p] == 0 ? 1 : 0;
+    tally.add({squared, std::sqrt(against_mean), black}, block_[p], is_dark_[p] != 0);
   }
-  ErrorAsShown error{.mse = all.value(),
-                     .darkest_mse = darkest.value(),
-                     .worst_block_mse = 0,
-                     .percentile_99_9 = quantile(std::move(deviation), 0.999),
-                     .black = black.value()};
-  for (const Mean& block : blocks) {
-    if (block.count >= kFewestInNoiseBlock)
-      error.worst_block_mse = std::max(error.worst_block_mse, block.value());
-  }
-  return error;
+  return tally.total();
 }
 
 }  // namespace baton

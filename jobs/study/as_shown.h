@@ -29,6 +29,9 @@ class ReferenceAsShown {
 
   /// Squared errors are (I - A)(I - B), as those in linear radiance (FrameMeasures).
   ErrorAsShown error_of(const RgbImage& test) const;
+  /// Of either half alone, as far as it is noise: half the squared difference of both, which has no
+  /// part that both have. black: where the other half is not.
+  ErrorAsShown noise_of_half() const;
   /// Mean squared error of the mean of the halves: what cannot be resolved.
   double own_mse() const { return own_mse_; }
 

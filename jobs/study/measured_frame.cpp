@@ -30,19 +30,25 @@ std::vector<float> mean_plane(const FilmTile& film, const std::string& layer) {
 
 }  // namespace
 
+RgbImage image_of(const FilmTile& film, const std::array<const char*, 3>& channels) {
+  RgbImage image{film.rect.width(), film.rect.height(), {}};
+  image.rgb.resize(3 * film.num_pixels());
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::vector<float> values = plane(film, channels[c]);
+    for (std::size_t i = 0; i < values.size(); ++i) image.rgb[3 * i + c] = values[i];
+  }
+  return image;
+}
+
 Result<MeasuredFrame> read_measured_frame(const std::filesystem::path& path) {
   BATON_ASSIGN(const FilmTile film, read_exr(path, ExrWindow::seen));
-  MeasuredFrame frame;
-  frame.image = {film.rect.width(), film.rect.height(), {}};
-  frame.image.rgb.resize(3 * film.num_pixels());
-  const char* const names[] = {"R", "G", "B"};
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    const std::vector<float> values = plane(film, names[channel]);
-    for (std::size_t i = 0; i < values.size(); ++i) frame.image.rgb[3 * i + channel] = values[i];
-    if (values.empty())
+  for (const char* const channel : {"R", "G", "B"}) {
+    if (film.find(channel) == nullptr)
       return Error{ErrorKind::bad_input,
-                   fmt::format("{}: expected a channel {}", path.string(), names[channel])};
+                   fmt::format("{}: expected a channel {}", path.string(), channel)};
   }
+  MeasuredFrame frame;
+  frame.image = image_of(film);
   frame.coverage = plane(film, "A");
   frame.lns = plane(film, "lns");
   frame.ess = plane(film, "ess");

@@ -22,6 +22,10 @@ struct MeasuredFrame {
   std::vector<float> variance;
 };
 
+/// Three planes of a film as an image; one that it has not is 0.
+RgbImage image_of(const FilmTile& film,
+                  const std::array<const char*, 3>& channels = {"R", "G", "B"});
+
 /// Reads a frame. Errors name the file: missing, not an EXR, without R, G, B, A or lns.
 Result<MeasuredFrame> read_measured_frame(const std::filesystem::path& path);
 

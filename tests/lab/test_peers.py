@@ -137,10 +137,29 @@ def the_error_is_that_planted(_programs, _folder):
 
 
 def an_error_as_shown_counts_what_a_screen_shows(_programs, _folder):
-    """Above white nothing is seen; at linear .001 the slope of sRGB is 12.92."""
-    grey = np.full((32, 32, 3), 0.001)
-    check_close(errors.shown_error(grey, grey + 0.0002), 0.5 * (12.92 * 0.0002) ** 2, "in the dark", 1e-9)
-    check_close(errors.shown_error(grey + 1, grey + 7), 0, "above white", 1e-9)
+    """A grey is .4 at its exposure, whichever it is; by hand, a half that is twice as bright. White hides what is above it."""
+    linear = ((0.4 + 0.055) / 1.055) ** 2.4
+    apart = [1.055 * (linear * share) ** (1 / 2.4) - 0.055 for share in (1.05, 0.95)]
+    for level in (1e-4, 1, 300):
+        grey = np.full((32, 32, 3), level)
+        blocks, seen = errors.error_as_shown(1.05 * grey, 0.95 * grey)
+        for name, got in (("blocks", blocks), *((name, seen[name] ** 2) for name in ("darkest", "worst", "exceeded"))):
+            check_close(got, 0.5 * (apart[0] - apart[1]) ** 2, f"{name} of {level}", 1e-6)
+    half = np.full((32, 32, 3), 0.18)
+    half[:, 24:] = 1000
+    check_close(errors.error_as_shown(half, np.where(half > 1, half + 500, half))[0], 0, "above white", 1e-9)
+
+
+def a_corner_and_its_specks_are_seen(_programs, _folder):
+    """One block of 8 has all of the error, in the dark quarter; of black pixels those count that one picture has."""
+    a = np.full((32, 64, 3), 0.18)
+    a[16:, 32:] = 0.01
+    b = a.copy()
+    a[20, 40], a[18, 40], b[18, 40] = 0, 0, 0
+    blocks, seen = errors.error_as_shown(a, b)
+    check_close(seen["worst"] ** 2, blocks.sum(), "worst block", 1e-12)
+    check_close(2 * seen["darkest"] ** 2, blocks.sum(), "darkest quarter", 1e-12)
+    check_close(seen["black"], 0.5 / (32 * 64), "black", 1e-12)
 
 
 def a_ratio_is_that_planted(_programs, _folder):

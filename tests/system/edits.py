@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Sequences of edits of jobs, each submitted while the one before is at work: names of files, frames both ways, AOVs, sweeps,
 tiles; now and then with --restart. All workers give way to others, which render with another instruction set, and back. Waiters
-are killed, the last version is left alone, and every frame of it must be there and right, all of them by one instruction set; no
-attempt may fail.
+are killed. Of each version that is left alone until it is done, the last one among them, every frame must be there and right,
+all of them by one instruction set; no attempt may fail.
 
 usage: edits.py --bin FOLDER [--sequences N] [--seed S] [--keep]
 """
@@ -65,8 +65,8 @@ class Workers:
 class Sequence:
     """One job and its edits."""
 
-    def __init__(self, farm, workers, number, seed):
-        self.farm, self.workers, self.rng, self.diary = farm, workers, random.Random(seed), []
+    def __init__(self, farm, workers, expected, number, seed):
+        self.farm, self.workers, self.expected, self.rng, self.diary = farm, workers, expected, random.Random(seed), []
         self.job = Job(self.rng.choice(list(KINDS)), f"-{number}", farm.folder)
         self.next_at, self.waits_for_end = 0, False
         # Every third one begins with versions of fewer frames by others, and of all again.
@@ -95,8 +95,14 @@ class Sequence:
 
     def tend(self):
         """Edits the job when it is time. Returns whether it has ended."""
-        if time.monotonic() < self.next_at or (self.waits_for_end and self.farm.show(self.job.id)["status"] != "done"):
+        if time.monotonic() < self.next_at:
             return False
+        if self.waits_for_end:
+            if self.farm.show(self.job.id)["status"] != "done":
+                return False
+            # The next version might make wrong frames anew.
+            self.judge()
+            self.waits_for_end = False
         if self.job.id is None:
             self.submit()
             self.waits_for_end = self.turn > 0
@@ -130,6 +136,12 @@ class Sequence:
         self.waits_for_end = self.rng.random() < 0.3
         return False
 
+    def judge(self):
+        try:
+            self.expected.check(self.job)
+        except Fault as fault:
+            raise Fault(f"{self}: {fault}") from fault
+
     def __str__(self):
         return f"{self.job.path.stem} after {'; '.join(self.diary)}"
 
@@ -143,7 +155,8 @@ def run(programs, folder, num_sequences, seed):
         farm = stack.enter_context(Farm(programs, folder / "farm", workers=0))
         workers = Workers(farm, seed)
         for first in range(0, num_sequences, AT_ONCE):
-            sequences = [Sequence(farm, workers, number, f"{seed} {number}") for number in range(first, min(first + AT_ONCE, num_sequences))]
+            sequences = [Sequence(farm, workers, expected, number, f"{seed} {number}")
+                         for number in range(first, min(first + AT_ONCE, num_sequences))]
             waiting = list(sequences)
 
             def all_done():
@@ -153,10 +166,7 @@ def run(programs, folder, num_sequences, seed):
             wait_until(all_done, f"sequences {first} on are done: {', '.join(map(str, sequences))}", END_S)
             for sequence in sequences:
                 num_edits += len(sequence.diary)
-                try:
-                    expected.check(sequence.job)
-                except Fault as fault:
-                    raise Fault(f"{sequence}: {fault}") from fault
+                sequence.judge()
                 shutil.rmtree(sequence.job.frames)
         log = farm.coordinator.log()
         check("BUG" not in log, "the coordinator has found a bug")

@@ -4,7 +4,7 @@
 from edits import run
 from farm import run_tests
 
-NUM_SEQUENCES, SEED = 8, 1
+NUM_SEQUENCES, SEED = 4, 1
 
 
 def every_frame_is_right_after_sequences_of_edits(programs, folder):

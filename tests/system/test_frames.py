@@ -38,7 +38,7 @@ def harmed_frames_are_made_again(programs, folder):
             finish(farm, ident)
             shown = farm.show(ident)
             check_equal((shown["status"], shown["framesDone"]), ("done", FRAMES), f"job whose frame was {name}")
-            check_says(farm.coordinator.log(), "frame.0001.exr is gone, or not as it was written, and is made again")
+            check_says(farm.coordinator.log(), "frame.0001.exr is gone, or not as it was last written, and is made again")
         check_equal(programs.pixels(place / "frames"), expected, f"pixels after a frame was {name}")
 
 

@@ -120,7 +120,7 @@ def one_frame_is_gone_or_damaged(programs, folder):
         else:
             frame.unlink()
         text = render(programs, folder, job)
-        check_says(text, f"frame {number} is rendered", f"{frame} is gone, or not as it was written")
+        check_says(text, f"frame {number} is rendered", f"{frame} is gone, or not as it was last written")
         check_equal(rewritten(before, folder), [frame.name], "frames written again")
         check(files(folder) == expected, f"frame {number} is not what it was")
 

@@ -12,7 +12,7 @@ POOL = {"method": "pool", "numParticles": 8, "numCandidates": 32}
 
 
 def still(folder, **quality):
-    return make_job(folder, frames="3", image={"tileSize": 32, "sites": 4}, sampling=POOL, quality=quality,
+    return make_job(folder, frames="3", image={"width": 96, "height": 56, "tileSize": 32, "sites": 4}, sampling=POOL, quality=quality,
                     state={"keep": "last"}, output={"aovs": ["normal", "depth", "variance", "unshadowed", "blocked"]})
 
 
@@ -21,7 +21,7 @@ def turning(folder, **quality):
 
 
 def moving(folder, **quality):
-    job = moving_job(folder, image={"tileSize": 32, "sites": 4}, sampling=POOL, quality=quality, state={"keep": "last"})
+    job = moving_job(folder, image={"width": 96, "height": 56, "tileSize": 32, "sites": 4}, sampling=POOL, quality=quality, state={"keep": "last"})
     job["output"]["aovs"] = ["normal", "depth", "variance", "unshadowed", "blocked"]
     return job
 
@@ -69,7 +69,7 @@ def sequences_at_rest_and_in_motion(programs, folder):
 def only_new_sweeps_are_rendered(programs, folder):
     """One tile: its first sweep is done before anybody works at the others."""
     job = still(folder, rounds=2, refinable=True)
-    job["image"]["tileSize"] = 160
+    job["image"]["tileSize"] = 96
     with Farm(programs, folder / "farm") as farm:
         worker = farm.start_worker()
         first = farm.submit(write_job(folder / "job.json", job))

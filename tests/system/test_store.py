@@ -12,7 +12,7 @@ MOVING = camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (30, [1.5, 1.2, 4.8], [0, 0.
 
 def job_in(folder, **changes):
     """30 frames of 40 tiles with a checkpoint every 6."""
-    common = {"frames": "1-30", "image": {"width": 512, "height": 320}, "state": {"checkpointEvery": 6, "keep": "last"}}
+    common = {"frames": "1-30", "image": {"width": 256, "height": 160, "tileSize": 32}, "state": {"checkpointEvery": 6, "keep": "last"}}
     return write_job(folder / "job.json", make_job(folder, **{**common, **changes}))
 
 

@@ -13,39 +13,53 @@ namespace baton {
 namespace {
 
 using nlohmann::json;
-using Event = json::parse_event_t;
 
-/// Follows the parser through a document for what it lets pass: keys given twice and deep nesting.
-class StructureCheck {
+constexpr std::size_t kMostShown = 300;  ///< bytes of a message, of which a token is a part
+
+/// The first `size` bytes, or fewer, so that no character is cut.
+std::string_view beginning_of(std::string_view text, std::size_t size) {
+  while (size > 0 && size < text.size() && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80)
+    --size;
+  return text.substr(0, size);
+}
+
+/// The parser's message without its own prefixes: "line 3, column 7: syntax error ...".
+std::string plain_message(std::string message) {
+  for (const std::string_view prefix : {"] ", "parse error at "}) {
+    const std::size_t at = message.find(prefix);
+    if (at != std::string::npos) message.erase(0, at + prefix.size());
+  }
+  if (message.size() <= kMostShown) return message;
+  return fmt::format("{}...", beginning_of(message, kMostShown));
+}
+
+/// Follows the parser through a document for what it lets pass, keys given twice and deep nesting,
+/// without making values of it: a parser that makes them and asks about each takes time with the
+/// square of an object's members.
+class StructureCheck : public nlohmann::json_sax<json> {
  public:
-  /// Returns whether to keep the value: nothing below kMaxJsonDepth is.
-  bool operator()(int depth, Event event, const json& value) {
-    if (depth > limits::kMaxJsonDepth) {
-      if (!too_deep_)
-        faults_.push_back(
-            fmt::format("expected at most {} levels, got more", limits::kMaxJsonDepth));
-      too_deep_ = true;
-      return false;
-    }
-    switch (event) {
-      case Event::object_start:
-      case Event::array_start: {
-        std::string path = next_path();
-        levels_.push_back({event == Event::array_start, std::move(path), {}, 0, {}});
-        break;
-      }
-      case Event::object_end:
-      case Event::array_end:
-        levels_.pop_back();
-        break;
-      case Event::key:
-        add_key(value.get<std::string>());
-        break;
-      case Event::value:
-        next_path();
-        break;
-    }
+  bool null() override { return value(); }
+  bool boolean(bool) override { return value(); }
+  bool number_integer(number_integer_t) override { return value(); }
+  bool number_unsigned(number_unsigned_t) override { return value(); }
+  bool number_float(number_float_t, const string_t&) override { return value(); }
+  bool string(string_t&) override { return value(); }
+  bool binary(binary_t&) override { return value(); }
+  bool start_object(std::size_t) override { return start(false); }
+  bool start_array(std::size_t) override { return start(true); }
+  bool end_object() override { return end(); }
+  bool end_array() override { return end(); }
+  bool key(string_t& key) override {
+    Level& level = levels_.back();
+    level.key = key;
+    if (level.keys.insert(key).second || faults_.size() >= limits::kMaxFaultsReported) return true;
+    faults_.push_back(
+        fmt::format("{}: expected one value, got the key twice", json_path_key(level.path, key)));
     return true;
+  }
+  bool parse_error(std::size_t, const std::string&, const json::exception& error) override {
+    faults_ = {plain_message(error.what())};
+    return false;
   }
 
   const std::vector<std::string>& faults() const { return faults_; }
@@ -59,48 +73,42 @@ class StructureCheck {
     std::set<std::string> keys;
   };
 
-  /// Path of the value that begins here.
-  std::string next_path() {
-    if (levels_.empty()) return "$";
-    Level& level = levels_.back();
-    return level.array ? json_path_index(level.path, level.index++)
-                       : json_path_key(level.path, level.key);
+  bool value() {
+    if (!levels_.empty()) ++levels_.back().index;
+    return true;
   }
-
-  void add_key(const std::string& key) {
-    Level& level = levels_.back();
-    level.key = key;
-    if (level.keys.insert(key).second || faults_.size() >= limits::kMaxFaultsReported) return;
-    faults_.push_back(
-        fmt::format("{}: expected one value, got the key twice", json_path_key(level.path, key)));
+  bool start(bool is_array) {
+    if (levels_.size() >= limits::kMaxJsonDepth) {
+      faults_.push_back(fmt::format("expected at most {} levels, got more", limits::kMaxJsonDepth));
+      return false;
+    }
+    std::string path = next_path();
+    value();
+    levels_.push_back({is_array, std::move(path), {}, 0, {}});
+    return true;
+  }
+  bool end() {
+    levels_.pop_back();
+    return true;
+  }
+  /// Path of the value that begins here.
+  std::string next_path() const {
+    if (levels_.empty()) return "$";
+    const Level& level = levels_.back();
+    return level.array ? json_path_index(level.path, level.index)
+                       : json_path_key(level.path, level.key);
   }
 
   std::vector<Level> levels_;
   std::vector<std::string> faults_;
-  bool too_deep_ = false;
 };
-
-/// The parser's message without its own prefixes: "line 3, column 7: syntax error ...".
-std::string plain_message(std::string message) {
-  for (const std::string_view prefix : {"] ", "parse error at "}) {
-    const std::size_t at = message.find(prefix);
-    if (at != std::string::npos) message.erase(0, at + prefix.size());
-  }
-  return message;
-}
 
 }  // namespace
 
 Result<json> parse_json_text(std::string_view text, const std::string& name) {
   StructureCheck check;
-  json value;
-  try {
-    value = json::parse(
-        text, [&](int depth, Event event, json& parsed) { return check(depth, event, parsed); });
-  } catch (const json::exception& error) {
-    return Error{ErrorKind::bad_input, fmt::format("{}: {}", name, plain_message(error.what()))};
-  }
-  if (check.faults().empty()) return value;
+  json::sax_parse(text, &check);
+  if (check.faults().empty()) return json::parse(text);
 
   std::string message;
   for (const std::string& fault : check.faults()) {
@@ -110,6 +118,8 @@ Result<json> parse_json_text(std::string_view text, const std::string& name) {
 }
 
 std::string json_path_key(const std::string& path, std::string_view key) {
+  if (key.size() > limits::kMaxTextLength)
+    return fmt::format("{}[\"{}...\"]", path, beginning_of(key, kMostShown));
   const bool plain = !key.empty() && std::all_of(key.begin(), key.end(), [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c >= 0x80;
   });

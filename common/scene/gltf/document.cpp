@@ -166,22 +166,25 @@ ByteView Document::bytes_of_image(std::size_t image) const {
 }
 
 std::vector<int> shown_nodes(const Document& document) {
-  // A root may be below another one.
-  std::vector<bool> is_root(document.nodes.size(), false);
-  for (const int root : document.roots) is_root[static_cast<std::size_t>(root)] = true;
-  const auto is_shown_above = [&](int node) {
-    int above = document.nodes[static_cast<std::size_t>(node)].parent;
-    while (above >= 0 && !is_root[static_cast<std::size_t>(above)])
-      above = document.nodes[static_cast<std::size_t>(above)].parent;
-    return above >= 0;
+  const auto children_of = [&](int node) -> const std::vector<int>& {
+    return document.nodes[static_cast<std::size_t>(node)].children;
   };
-  std::vector<int> nodes;  // grows while it is walked
-  for (const int root : document.roots) {
-    const bool is_new = std::ranges::find(nodes, root) == nodes.end();
-    if (is_new && !is_shown_above(root)) nodes.push_back(root);
-  }
+  // A root may be below another one, or given twice.
+  std::vector<bool> is_taken(document.nodes.size(), false);
+  const auto take = [&](int node, std::vector<int>& nodes) {
+    if (is_taken[static_cast<std::size_t>(node)]) return;
+    is_taken[static_cast<std::size_t>(node)] = true;
+    nodes.push_back(node);
+  };
+  std::vector<int> below;  // grows while it is walked, as the next one
+  for (const int root : document.roots)
+    for (const int child : children_of(root)) take(child, below);
+  for (std::size_t i = 0; i < below.size(); ++i)
+    for (const int child : children_of(below[i])) take(child, below);
+  std::vector<int> nodes;
+  for (const int root : document.roots) take(root, nodes);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const std::vector<int>& children = document.nodes[static_cast<std::size_t>(nodes[i])].children;
+    const std::vector<int>& children = children_of(nodes[i]);
     nodes.insert(nodes.end(), children.begin(), children.end());
   }
   return nodes;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <thread>
 
+#include "common/image/contact_sheet.h"
 #include "common/image/image_io.h"
 #include "common/image/noise.h"
 #include "common/job/plan/sequence.h"
@@ -17,6 +18,9 @@
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
+#include "jobs/study/as_shown.h"
+#include "jobs/study/flip.h"
+#include "jobs/study/measured_frame.h"
 
 namespace baton {
 namespace {
@@ -38,13 +42,21 @@ struct CompareOptions {
   int workers = 1;
 };
 
+/// Of a job's frames, by two seeds.
+struct Noise {
+  double relative = 0;  ///< FrameNoise::relative(), rms over frames
+  /// Of one seed: means over frames; of worst blocks, the largest.
+  ErrorAsShown shown{};
+  double flip = 0;  ///< mean LDR-FLIP of the two seeds
+};
+
 /// One of the jobs and what was seen of it.
 struct Compared {
   JobSpec job;
   /// Two for its noise, where that is measured.
   std::vector<JobSpec> seeds{};
   JobSummary summary{};
-  double noise = 0;  ///< FrameNoise::relative(), rms over frames
+  Noise noise{};
 };
 
 /// The first frames of job `number` with another seed, whose sites are its own.
@@ -98,17 +110,51 @@ Status check_alike(const std::vector<Compared>& jobs, const CompareOptions& opti
   return {};
 }
 
-Result<double> noise_of(const Compared& compared) {
+/// The mean difference that a person sees between two pictures, where the first has a surface.
+double flip_of(const FilmTile& first, const FilmTile& second) {
+  const RgbImage image = image_of(first);
+  const float exposure = auto_exposure(image);
+  const std::vector<float> flip =
+      flip_difference(tone_map(image, exposure), tone_map(image_of(second), exposure));
+  const float* const coverage = first.find("A");
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < flip.size(); ++i) {
+    if (!(coverage[i] > 0)) continue;
+    sum += flip[i];
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+/// All that two pictures of one frame tell; `relative` is squared.
+Noise noise_of(const FilmTile& first, const FilmTile& second) {
+  const double relative = noise_of_seeds(first, second).relative();
+  const float* const coverage = first.find("A");
+  const ReferenceAsShown both(image_of(first), image_of(second),
+                              {coverage, coverage + first.num_pixels()});
+  return {relative * relative, both.noise_of_half(), flip_of(first, second)};
+}
+
+Result<Noise> noise_of(const Compared& compared) {
   const FrameIndex end(static_cast<std::int32_t>(compared.seeds[0].frames.size()));
   const FrameIndex begin = std::max(end - static_cast<std::int32_t>(kNoiseFrames), FrameIndex());
-  double squares = 0;
+  const double share = 1.0 / (end - begin);
+  Noise all;
   for (FrameIndex f = begin; f < end; ++f) {
     BATON_ASSIGN(const FilmTile first, read_exr(frame_path(compared.seeds[0], f)));
     BATON_ASSIGN(const FilmTile second, read_exr(frame_path(compared.seeds[1], f)));
-    const double noise = noise_of_seeds(first, second).relative();
-    squares += noise * noise;
+    const Noise noise = noise_of(first, second);
+    all.relative += share * noise.relative;
+    all.flip += share * noise.flip;
+    all.shown.mse += share * noise.shown.mse;
+    all.shown.darkest_mse += share * noise.shown.darkest_mse;
+    all.shown.worst_block_mse = std::max(all.shown.worst_block_mse, noise.shown.worst_block_mse);
+    all.shown.percentile_99_9 += share * noise.shown.percentile_99_9;
+    all.shown.black += share * noise.shown.black;
   }
-  return std::sqrt(squares / (end - begin));
+  all.relative = std::sqrt(all.relative);
+  return all;
 }
 
 /// A row of frames for each job.
@@ -128,23 +174,41 @@ Status write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
   return write_sheet(path, std::move(thumbnails), numbers, static_cast<int>(frames.size()), {});
 }
 
-void print_table(const std::vector<Compared>& jobs, bool with_noise, const fs::path& sheet) {
-  std::size_t width = 4;
-  for (const Compared& compared : jobs) width = std::max(width, compared.job.name.size());
-  const std::string noise = with_noise ? fmt::format("  {:>7}", "noise") : "";
-  fmt::print("{:<{}}  {:>9}{}  {:>11}  {}\n", "job", width, "CPU", noise, "handed on", "frames");
+/// As people see it, in steps of 255.
+void print_noise(const std::vector<Compared>& jobs, std::size_t width) {
+  constexpr double kSteps = 255;
+  fmt::print("{:<{}}  {:>7}  {:>8}  {:>8}  {:>11}  {:>8}  {:>9}  {:>6}\n", "noise", width, "linear",
+             "as shown", "darkest", "worst block", "99.9 %", "black", "FLIP");
   for (const Compared& compared : jobs) {
-    fmt::print("{:<{}}  {:>7.1f} s{}  {:>11}  {}/{}\n", compared.job.name, width,
-               compared.summary.stats.cpu_seconds,
-               with_noise ? fmt::format("  {:>5.3g} %", 100 * compared.noise) : "",
-               bytes_text(compared.summary.state_bytes), compared.job.output.directory,
-               compared.job.output.pattern);
-  }
-  if (with_noise)
+    const Noise& noise = compared.noise;
     fmt::print(
-        "noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds "
-        "and their sites\n");
+        "{:<{}}  {:>5.3g} %  {:>8.2f}  {:>8.2f}  {:>11.2f}  {:>8.1f}  {:>7.2g} %  {:>6.3f}\n",
+        compared.job.name, width, 100 * noise.relative, kSteps * std::sqrt(noise.shown.mse),
+        kSteps * std::sqrt(noise.shown.darkest_mse),
+        kSteps * std::sqrt(noise.shown.worst_block_mse), kSteps * noise.shown.percentile_99_9,
+        100 * noise.shown.black, noise.flip);
+  }
+  fmt::print(
+      "By two more seeds and their sites. linear: a pixel's standard deviation, rms, over the mean "
+      "radiance.\n"
+      "As shown, in steps of 255: after exposure and sRGB, rms over all pixels, the darkest "
+      "quarter, the worst\n"
+      "16 x 16 pixels; the deviation that one pixel in 1,000 exceeds; pixels that are black in one "
+      "seed alone;\n"
+      "FLIP between the seeds\n");
+}
+
+void print_table(const std::vector<Compared>& jobs, bool with_noise, const fs::path& sheet) {
+  std::size_t width = 5;
+  for (const Compared& compared : jobs) width = std::max(width, compared.job.name.size());
+  fmt::print("{:<{}}  {:>9}  {:>11}  {}\n", "job", width, "CPU", "handed on", "frames");
+  for (const Compared& compared : jobs) {
+    fmt::print("{:<{}}  {:>7.1f} s  {:>11}  {}/{}\n", compared.job.name, width,
+               compared.summary.stats.cpu_seconds, bytes_text(compared.summary.state_bytes),
+               compared.job.output.directory, compared.job.output.pattern);
+  }
   fmt::print("handed on: sample state, packed, from frame to frame\n");
+  if (with_noise) print_noise(jobs, width);
   fmt::print("sheet, a row for each job: {}\n", sheet.string());
 }
 

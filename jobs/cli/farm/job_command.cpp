@@ -4,6 +4,8 @@
 #include <chrono>
 #include <filesystem>
 #include <optional>
+#include <set>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -107,7 +109,7 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   const Clock::time_point start = Clock::now();
   std::optional<Clock::time_point> last_answer;
   std::string job = options.job;  // once it is found, its ID: others may take its name
-  std::string told;               // what it waits for
+  std::set<std::string> told;     // what it waits for now, each once: two faults may alternate
   std::size_t num_grown = 0;      // decisions that were printed
   for (;;) {
     const Result<ShownJob> answer = ask<ShownJob>(client, ShowJob{job});
@@ -133,8 +135,9 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
       print_detail(*answer, options.json);
       return is_open(detail.summary.status) ? ExitCode::timeout : exit_code_of(detail);
     }
-    if (const std::string waits = std::exchange(told, detail.waits); waits != told && !told.empty())
-      fmt::print(stderr, "waits for {}\n", told);
+    if (detail.waits.empty()) told.clear();
+    if (!detail.waits.empty() && told.insert(detail.waits).second)
+      fmt::print(stderr, "waits for {}\n", detail.waits);
     std::this_thread::sleep_for(kPollInterval);
   }
 }

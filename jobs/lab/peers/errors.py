@@ -39,14 +39,37 @@ class Pair:
     grey_variance: np.ndarray  # (frames, blocks): variance of a pixel's mean over channels
     grey: np.ndarray  # (2, frames, blocks): mean over channels and pixels of each run
     cpu: np.ndarray  # (2): CPU seconds of each run
-    shown: np.ndarray  # (1, blocks): squared error of the last frame as a screen shows it, 0 to 1
+    shown: np.ndarray  # (1, blocks): squared error of the last frame as people see it, 0 to 1
+    seen: dict  # by SEEN: where it is worst
 
 
-def shown_error(a, b):
-    """Squared error of one of two pictures, (height, width, 3), as sRGB clamped to [0, 1]: dark parts count as the eye
-    sees them, highlights no more than white. Returns (1, blocks)."""
-    apart = pictures.to_display(a) - pictures.to_display(b)
-    return block_means(0.5 * np.square(apart).mean(-1)[None])
+SEEN = ("darkest", "worst", "exceeded", "black")
+FEWEST_IN_BLOCK = 64  # pixels; smaller ones at the edge are not judged
+
+
+def exposure_as_shown(picture):
+    """The factor at which the mean of the picture on a display is .4."""
+    low, high = 1e-9, 1e9
+    for _ in range(100):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if pictures.to_display(middle * picture).mean() < 0.4 else (low, middle)
+    return middle
+
+
+def error_as_shown(a, b):
+    """Error of one of two pictures, (height, width, 3), at one exposure, as sRGB clamped to [0, 1]: dark parts count as the
+    eye sees them, highlights no more than white. Returns the squared error, (1, blocks), and where it is worst: RMSE of the
+    darkest quarter and of the worst block, what one pixel in 1,000 exceeds, the share of pixels black in one picture alone."""
+    mean = 0.5 * (a.astype(np.float64) + b)
+    exposure = exposure_as_shown(mean)
+    squared = 0.5 * np.square(pictures.to_display(exposure * a) - pictures.to_display(exposure * b)).mean(-1)
+    blocks = block_means(squared[None])
+    brightness = pictures.to_display(exposure * mean).sum(-1)
+    black = [(picture <= 0).all(-1) for picture in (a, b)]
+    seen = {"darkest": np.sqrt(squared[brightness <= np.quantile(brightness, 0.25)].mean()),
+            "worst": np.sqrt(blocks[0][block_sizes(*squared.shape) >= FEWEST_IN_BLOCK].max(initial=0)),
+            "exceeded": np.quantile(np.sqrt(squared), 0.999), "black": 0.5 * (black[0] != black[1]).mean()}
+    return blocks, seen
 
 
 def measure_pair(a, b, cpu):
@@ -54,7 +77,7 @@ def measure_pair(a, b, cpu):
     grey_a, grey_b = a.mean(-1, dtype=np.float64), b.mean(-1, dtype=np.float64)
     half_squares = 0.5 * np.square(a.astype(np.float64) - b).mean(-1)
     return Pair(block_means(half_squares), block_means(0.5 * np.square(grey_a - grey_b)),
-                np.stack([block_means(grey_a), block_means(grey_b)]), np.asarray(cpu, float), shown_error(a[-1], b[-1]))
+                np.stack([block_means(grey_a), block_means(grey_b)]), np.asarray(cpu, float), *error_as_shown(a[-1], b[-1]))
 
 
 @dataclass
@@ -76,6 +99,10 @@ class Setting:
 
     def mse(self, measure="mse"):
         return float((self.blocks(measure) @ self.shares).mean())
+
+    def seen(self, what):
+        """One of SEEN, mean over pairs."""
+        return float(np.mean([pair.seen[what] for pair in self.pairs]))
 
     def cpu(self):
         return float(np.mean([pair.cpu for pair in self.pairs]))

@@ -151,8 +151,8 @@ def pair_of_runs(renderer, work, number):
                  last=np.stack([a[-1], b[-1]]))
         unfinished.rename(path)
     with np.load(path) as kept:
-        shown = errors.shown_error(*kept["last"])
-        return errors.Pair(kept["mse"], kept["grey_variance"], kept["grey"], kept["cpu"], shown), path
+        return errors.Pair(kept["mse"], kept["grey_variance"], kept["grey"], kept["cpu"],
+                           *errors.error_as_shown(*kept["last"])), path
 
 
 def last_frames(path):

@@ -87,12 +87,15 @@ def main_table(scenes):
 def settings_table(scene):
     lines = [f"{scene.placed['name']}: {scene.triangles()} triangles, {scene.placed['width']} x "
              f"{scene.placed['height']} pixels, {len(scene.placed['frames'])} frames, {scene.kind}", "",
-             "| | spp or rounds | pairs | CPU s | RMSE | efficiency | as shown: RMSE |", "|---|---|---|---|---|---|---|"]
+             "| | spp or rounds | pairs | CPU s | RMSE | efficiency | as shown: RMSE | darkest quarter | worst block | 99.9 % | "
+             "black |",
+             "|---|---|---|---|---|---|---|---|---|---|---|"]
     for name, curve in {"Cycles": scene.cycles, **scene.variants}.items():
         for s in curve:
             low, high = errors.interval(1 / (s.draws["mse"] * s.draws["cpu"]))
             lines.append(f"| {name} | {s.level} | {len(s.pairs)} | {digits(s.cpu(), 3)} | {rmse_text(s)} | "
-                         f"{digits(s.efficiency(), 3)} [{digits(low, 3)}, {digits(high, 3)}] | {rmse_text(s, 'shown')} |")
+                         f"{digits(s.efficiency(), 3)} [{digits(low, 3)}, {digits(high, 3)}] | {rmse_text(s, 'shown')} | "
+                         f"{' | '.join(digits(s.seen(what)) for what in errors.SEEN[:-1])} | {100 * s.seen('black'):.2g} % |")
     return [*lines, ""]
 
 
@@ -125,7 +128,8 @@ def numbers(scenes):
     """The same for programs."""
     def of_setting(name, s):
         return {"renderer": name, "level": s.level, "pairs": len(s.pairs), "cpuSeconds": s.cpu(), "mse": s.mse(),
-                "mseInterval": errors.interval(s.draws["mse"]), "efficiency": s.efficiency(), "shownMse": s.mse("shown")}
+                "mseInterval": errors.interval(s.draws["mse"]), "efficiency": s.efficiency(), "shownMse": s.mse("shown"),
+                **{f"shown{what.capitalize()}": s.seen(what) for what in errors.SEEN}}
 
     return json.dumps([{
         "scene": scene.placed["name"], "kind": scene.kind, "goal": GOALS[scene.kind], "triangles": scene.triangles(),

@@ -10,22 +10,13 @@
 #include "common/image/image_io.h"
 #include "common/scene/settle/settle_motion.h"
 #include "jobs/lab/studies/sequential_runs.h"
+#include "jobs/study/measured_frame.h"
 
 namespace baton {
 namespace {
 
 constexpr std::size_t kShown = 3;  ///< frames in the image, with the last one
 constexpr int kGap = 4;
-
-RgbImage image_of(const FilmTile& film, const std::array<const char*, 3>& channels) {
-  RgbImage image{film.rect.width(), film.rect.height(), {}};
-  image.rgb.resize(3 * film.num_pixels());
-  for (std::size_t c = 0; c < 3; ++c) {
-    const std::span<const float> values = plane(film, channels[c]);
-    for (std::size_t i = 0; i < values.size(); ++i) image.rgb[3 * i + c] = values[i];
-  }
-  return image;
-}
 
 /// Copies an image with its corner at (left, top).
 void paste(const RgbImage& from, int left, int top, RgbImage& to) {

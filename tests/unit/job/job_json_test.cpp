@@ -234,6 +234,22 @@ TEST(JobJson, RefusesKeysGivenTwiceAndDeepNesting) {
             "job.json: expected at most 32 levels, got more");
 }
 
+// A parser that takes time with the square of an object's members would need half an hour.
+TEST(JobJson, ManyMembersAreReadInTimeThatGrowsWithThem) {
+  std::string text = "{\"scene\": {\"materials\": {";
+  for (int i = 0; i < 200'000; ++i)
+    text += fmt::format("{}\"m{}\": {{\"type\": \"diffuse\"}}", i > 0 ? ", " : "", i);
+  EXPECT_THAT(faults_of(text + "}}}"), HasSubstr("expected an object of at most 4096"));
+}
+
+TEST(JobJson, WhatIsLongIsShownInPart) {
+  const std::string digits(1'000'000, '1'), word(1'000'000, 'k');
+  for (const std::string& text : {"{\"seed\": " + digits + "}", "{\"" + word + "\": 1}", "{" + word,
+                                  "{\"name\": \"" + word}) {
+    EXPECT_LT(faults_of(text).size(), 5000) << text.substr(0, 30);
+  }
+}
+
 TEST(JobJson, CountsFaultsPastTheLimit) {
   std::string text = "\"state\": {\"x0\": 0";
   for (int i = 1; i < 150; ++i) text += ", \"x" + std::to_string(i) + "\": 0";

@@ -129,7 +129,7 @@ TEST_F(SlowDiskTest, NobodyWaitsForTheFramesOfASubmission) {
   ASSERT_TRUE(write_file_atomic(frame, as_bytes_view(other)).ok());
   const auto again = ask_until_done<JobAccepted>(service.endpoint(), SubmitJob{document});
   EXPECT_FALSE(again.already_there);
-  EXPECT_THAT(again.plan, HasSubstr("frame.0003.exr is gone, or not as it was written"));
+  EXPECT_THAT(again.plan, HasSubstr("frame.0003.exr is gone, or not as it was last written"));
 }
 
 // The frames of another picture are looked at before anything is replaced.

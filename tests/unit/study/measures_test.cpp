@@ -172,6 +172,28 @@ TEST(AsShown, TheNoiseOfTheReferenceDropsOut) {
   EXPECT_NEAR(against_halves / against_truth, 1, 0.02);
 }
 
+// H0: half the squared difference of two seeds is the error of one against the truth; 200 seeds, as
+// above.
+TEST(AsShown, TheNoiseOfAHalfIsItsErrorAgainstTheTruth) {
+  double of_half = 0, against_truth = 0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    const MeasuredFrame a = noisy(0.5f, 0.02f, 2 * seed), b = noisy(0.5f, 0.02f, 2 * seed + 1);
+    of_half += ReferenceAsShown(a.image, b.image, a.coverage).noise_of_half().mse;
+    against_truth += measure_frame(a, make_reference(flat(0.5f), flat(0.5f))).shown.mse;
+  }
+  EXPECT_NEAR(of_half / against_truth, 1, 0.02);
+}
+
+TEST(AsShown, TheNoiseOfAHalfHasItsCornerAndItsSpecks) {
+  MeasuredFrame a = flat(0.18f), b = flat(0.18f);
+  for (std::size_t k = 3; k < 6; ++k) a.image.rgb[k] = 0;
+  for (std::size_t k = 6; k < 9; ++k) a.image.rgb[k] = b.image.rgb[k] = 0;
+  const ErrorAsShown noise = ReferenceAsShown(a.image, b.image, a.coverage).noise_of_half();
+  EXPECT_NEAR(noise.black, 0.5 / kPixels, 1e-12) << "one of two seeds; black in both is black";
+  EXPECT_NEAR(noise.mse * kPixels, 0.5 * 0.4 * 0.4, 0.01);
+  EXPECT_NEAR(noise.worst_block_mse, noise.mse, 1e-12) << "128 pixels are one square";
+}
+
 TEST(AsShown, PicturesWithoutAnyPixelOrLightAreMeasured) {
   MeasuredFrame nothing = flat(0);
   EXPECT_EQ(measure_frame(nothing, make_reference(nothing, nothing)).shown.mse, 0);
