@@ -10,6 +10,7 @@
 #include "common/base/exit_codes.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
+#include "common/base/option_values.h"
 #include "common/image/exr_check.h"
 #include "coordinator/service/service.h"
 
@@ -54,6 +55,10 @@ int main(int argc, char** argv) {
       "farm/endpoint\n"
       "The work folder must be on a file system that all workers share.");
 
+  app.parse_complete_callback([&app] {
+    if (const std::string fault = baton::value_fault(app); !fault.empty())
+      throw CLI::ValidationError(fault);
+  });
   baton::ServiceOptions options;
   std::filesystem::path endpoint_file;
   std::int64_t heartbeat_ms = options.heartbeat.count();

@@ -10,7 +10,9 @@
 #include <cstdio>
 #include <thread>
 
+#include "common/base/legible.h"
 #include "common/base/log.h"
+#include "common/base/option_values.h"
 #include "worker/run/crash_handler.h"
 #include "worker/run/replay.h"
 #include "worker/run/worker.h"
@@ -37,6 +39,13 @@ void install_drain_handler() {
   };
   ::sigaction(SIGTERM, &action, nullptr);
   ::sigaction(SIGINT, &action, nullptr);
+}
+
+/// Of a worker: why no list could show it; empty: one can.
+std::string name_fault(const std::string& name) {
+  const std::string shown = baton::legible_line(name);
+  if (shown == name) return {};
+  return fmt::format("expected UTF-8 without line breaks and other controls, got '{}'", shown);
 }
 
 /// What a worker must be told on a machine that is lent to it.
@@ -103,12 +112,33 @@ int replay(const baton::ReplayOptions& options) {
   return static_cast<int>(baton::exit_code_of(report.error().kind));
 }
 
+int work(baton::WorkerOptions& worker, const PilotOptions& pilot, const std::string& key_file,
+         bool insecure) {
+  install_drain_handler();
+  worker.machine.num_threads = worker.num_threads;
+  if (const baton::Status taken = take_pilot_options(pilot, worker); !taken) {
+    spdlog::error("{}", taken.error().message);
+    return static_cast<int>(baton::exit_code_of(taken.error().kind));
+  }
+  baton::Result<baton::ClientAccess> access = baton::client_access(key_file, insecure);
+  if (!access) {
+    spdlog::error("{}", access.error().message);
+    return static_cast<int>(baton::exit_code_of(access.error().kind));
+  }
+  worker.access = std::move(access).value();
+  return static_cast<int>(baton::run_worker(worker, g_signals));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app("Renders tiles for a baton-coordinator.", "baton-worker");
   app.set_version_flag("--version", baton::describe_worker);
   app.require_subcommand(0, 1);
+  app.parse_complete_callback([&app] {
+    if (const std::string fault = baton::value_fault(app); !fault.empty())
+      throw CLI::ValidationError(fault);
+  });
 
   // Without a subcommand: work for a coordinator.
   baton::WorkerOptions worker;
@@ -121,7 +151,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1024));
   app.add_option("--name", worker.worker_id,
                  "for people; several workers may have one; default: host and process id")
-      ->envname("BATON_WORKER_NAME");
+      ->envname("BATON_WORKER_NAME")
+      ->check(name_fault);
   app.add_option("--give-up-s", give_up_s,
                  "ends when no coordinator has answered for so long; 0: never")
       ->capture_default_str()
@@ -167,18 +198,6 @@ int main(int argc, char** argv) {
     if (pixel.size() == 2) replay_options.pixel = baton::PixelPosition{pixel[0], pixel[1]};
     return replay(replay_options);
   }
-  install_drain_handler();
   worker.give_up = std::chrono::seconds(give_up_s);
-  worker.machine.num_threads = worker.num_threads;
-  if (const baton::Status taken = take_pilot_options(pilot, worker); !taken) {
-    spdlog::error("{}", taken.error().message);
-    return static_cast<int>(baton::exit_code_of(taken.error().kind));
-  }
-  baton::Result<baton::ClientAccess> access = baton::client_access(key_file, insecure);
-  if (!access) {
-    spdlog::error("{}", access.error().message);
-    return static_cast<int>(baton::exit_code_of(access.error().kind));
-  }
-  worker.access = std::move(access).value();
-  return static_cast<int>(baton::run_worker(worker, g_signals));
+  return work(worker, pilot, key_file, insecure);
 }

@@ -24,11 +24,16 @@ std::string_view worker_activity_name(WorkerActivity activity) {
   return name_of(kNames, activity);
 }
 
+std::string_view absence_name(Absence absence) {
+  constexpr std::array<std::string_view, 3> kNames{"lost", "turned away", "left"};
+  return name_of(kNames, absence);
+}
+
 std::string_view reason_kind_name(ReasonKind kind) {
-  constexpr std::array<std::string_view, 20> kNames{
-      "input",     "order",    "busy",   "held",       "skipped", "left out", "running",
-      "no worker", "renderer", "blind",  "tried",      "store",   "disk",     "paused",
-      "ended",     "draining", "asking", "inspecting", "no job",  "gone"};
+  constexpr std::array<std::string_view, 22> kNames{
+      "input",    "order",      "busy",   "held",  "skipped", "left out",   "running", "no worker",
+      "renderer", "blind",      "tried",  "store", "disk",    "paused",     "ended",   "draining",
+      "asking",   "inspecting", "no job", "gone",  "silent",  "turned away"};
   return name_of(kNames, kind);
 }
 

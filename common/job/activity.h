@@ -37,6 +37,16 @@ constexpr WorkerActivity last_of(WorkerActivity) { return WorkerActivity::silent
 /// "idle" ... "silent".
 std::string_view worker_activity_name(WorkerActivity activity);
 
+/// Why a worker is not here. Sent; values are for ever.
+enum class Absence : std::uint8_t {
+  lost = 0,         ///< it was silent for too long
+  turned_away = 1,  ///< it asked, and may not come in
+  left = 2,         ///< it ended in order
+};
+constexpr Absence last_of(Absence) { return Absence::left; }
+/// "lost", "turned away", "left".
+std::string_view absence_name(Absence absence);
+
 /// How long tasks take that were done of late, from grant to report.
 struct UsualTime {
   double median_s = 0;
@@ -64,23 +74,25 @@ enum class ReasonKind : std::uint8_t {
   skipped = 4,   ///< links that are left out
   left_out = 5,  ///< a worker gets no tasks of the job
   // The last cause.
-  running = 6,      ///< a worker has the task
-  no_worker = 7,    ///< nobody is connected
-  renderer = 8,     ///< who is connected renders otherwise
-  blind = 9,        ///< nobody sees the job's folders
-  tried = 10,       ///< workers have failed the task, or rest
-  store = 11,       ///< no room in the store
-  disk = 12,        ///< a disk takes nothing
-  paused = 13,      ///< by a person, or for want of something
-  ended = 14,       ///< the job or the task has ended
-  draining = 15,    ///< workers take nothing new
-  asking = 16,      ///< a worker is free and will ask for it
-  inspecting = 17,  ///< frames are read once more
-  no_job = 18,      ///< no job has a task for the worker
-  gone = 19,        ///< the worker is not connected
+  running = 6,       ///< a worker has the task
+  no_worker = 7,     ///< nobody is connected
+  renderer = 8,      ///< who is connected renders otherwise
+  blind = 9,         ///< nobody sees the job's folders
+  tried = 10,        ///< workers have failed the task, or rest
+  store = 11,        ///< no room in the store
+  disk = 12,         ///< a disk takes nothing
+  paused = 13,       ///< by a person, or for want of something
+  ended = 14,        ///< the job or the task has ended
+  draining = 15,     ///< workers take nothing new
+  asking = 16,       ///< a worker is free and will ask for it
+  inspecting = 17,   ///< frames are read once more
+  no_job = 18,       ///< no job has a task for the worker
+  gone = 19,         ///< the worker is not connected
+  silent = 20,       ///< a worker says nothing
+  turned_away = 21,  ///< the worker may not come in
 };
-constexpr ReasonKind last_of(ReasonKind) { return ReasonKind::gone; }
-/// "input" ... "gone".
+constexpr ReasonKind last_of(ReasonKind) { return ReasonKind::turned_away; }
+/// "input" ... "turned away".
 std::string_view reason_kind_name(ReasonKind kind);
 /// Whether no other link explains it.
 constexpr bool is_last(ReasonKind kind) { return kind >= ReasonKind::running; }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/archive.h"
+#include "common/base/legible.h"
 #include "common/base/limits.h"
 
 namespace baton {
@@ -26,6 +27,43 @@ constexpr std::uint64_t kMaxBodyBytes =
         ? limits::kMaxWorkerMessageBytes
         : limits::kMaxMessageBytes;
 
+/// Nothing of these is shown: documents, whose bytes their digests are of, and a path that is
+/// opened.
+template <class T>
+constexpr bool kIsVerbatim = kIsOneOf<T, SubmitJob, JobDocument, WorkerWelcome>;
+/// What these say may be several lines; any other says names.
+template <class T>
+constexpr bool kHasLines = kIsOneOf<T, TaskDone, TaskFailed, LeaseReturn, JobAccepted, JobList,
+                                    ShownJob, EventList, ReasonChain, TaskList, Refused>;
+
+/// Makes every text of a value legible.
+class LegibleTexts {
+ public:
+  using Legible = std::string(std::string_view);
+  explicit LegibleTexts(Legible* legible) : legible_(legible) {}
+
+  void make(std::string& text) const { text = legible_(text); }
+  template <class T>
+  void make(std::vector<T>& values) const {
+    for (T& value : values) make(value);
+  }
+  template <class T, std::size_t N>
+  void make(std::array<T, N>& values) const {
+    for (T& value : values) make(value);
+  }
+  template <class T>
+  requires std::is_aggregate_v<T>
+  void make(T& value) const {
+    std::apply([&](auto&... members) { (make(members), ...); }, members_of(value));
+  }
+  /// A number.
+  template <class T>
+  void make(T& /*value*/) const {}
+
+ private:
+  Legible* legible_;
+};
+
 template <std::size_t Type>
 Result<Message> decode_body(ByteView body) {
   std::variant_alternative_t<Type, Message> message;
@@ -40,6 +78,8 @@ Result<Message> decode_body(ByteView body) {
     return Error{ErrorKind::bad_input,
                  fmt::format("message: type {}: {} bytes are no valid body", Type, body.size())};
   }
+  if constexpr (!kIsVerbatim<decltype(message)>)
+    LegibleTexts(kHasLines<decltype(message)> ? legible_text : legible_line).make(message);
   return Message(std::move(message));
 }
 

@@ -20,7 +20,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 15;
+inline constexpr std::uint16_t kProtocolVersion = 16;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.
@@ -120,10 +120,13 @@ struct Drain {};
 struct Shutdown {};
 
 // ---- client to coordinator ----------------------------------------------------------------------
-/// restart: frames of another picture in the output folder may be replaced.
 struct SubmitJob {
   std::string json;
+  /// Frames of another picture in the output folder may be replaced.
   bool restart = false;
+  /// A priority that somebody has set stays, as it is not a file that is submitted; else that of
+  /// the document counts.
+  bool keep_priority = false;
 };
 struct ListJobs {
   bool all = false;  ///< also jobs that have ended, the newest
@@ -167,8 +170,8 @@ struct AskWhy {
   FrameNumber frame{};
   std::int32_t tile = -1;  ///< of the frame; -1: the whole frame
 };
-/// The tasks that workers have now, and those that were failed. job: as of ShowJob; empty: of all
-/// jobs that have not ended.
+/// The tasks that workers have now, and attempts that have failed since the job was submitted last.
+/// job: as of ShowJob; empty: of all jobs that have not ended.
 struct ListTasks {
   std::string job;
 };
@@ -222,12 +225,15 @@ struct WorkerSummary {
   std::string build = {}, renderer = {};
   std::vector<BlindSpot> blind = {};
 };
-/// A worker that was lost, and has not come again.
-struct LostWorker {
+/// A worker that is not here, and of which people may want to know why.
+struct AbsentWorker {
   std::string worker_id;
-  std::string about;           ///< what was told when it joined
+  Absence absence = Absence::lost;
+  /// What was told when it joined, or asked to.
+  std::string about = {};
+  std::string reason = {};     ///< why it was turned away, or left
   std::int64_t joined_ms = 0;  ///< since 1970, UTC; 0: not known
-  std::int64_t lost_ms = 0;
+  std::int64_t since_ms = 0;   ///< it was lost or left, or asked last
 };
 struct JobAccepted {
   JobIdentity identity;
@@ -245,7 +251,8 @@ struct JobList {
   std::uint64_t tasks_ready = 0;
   /// CPU time of the longest recent tasks of these jobs; 0: not known.
   double task_seconds = 0;
-  std::vector<LostWorker> lost = {};  ///< in the last day, the newest first
+  /// Of the last day, the newest first: workers that were turned away, and those that were lost.
+  std::vector<AbsentWorker> turned_away = {}, lost = {};
 };
 struct JobDetail {
   JobSummary summary;
@@ -281,8 +288,10 @@ struct ListedTask {
   TaskPlace task;
   std::string worker;
   bool has_failed = false;
-  double seconds = 0;        ///< of a task in hand: since it was granted
-  UsualTime usual = {};      ///< of a task in hand
+  double seconds = 0;    ///< since it was granted, till it failed
+  UsualTime usual = {};  ///< of a task in hand
+  /// When it failed, since 1970, UTC; 0: it has not.
+  std::int64_t time_ms = 0;
   std::string message = {};  ///< of one that has failed
 };
 struct TaskList {

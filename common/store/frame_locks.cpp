@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "common/base/file_stamp.h"
 #include "common/base/files.h"
@@ -35,19 +36,8 @@ Result<Locks> read_locks(const std::filesystem::path& file) {
   return locks;
 }
 
-}  // namespace
-
-std::filesystem::path lock_file(const std::filesystem::path& folder) {
-  return folder / ".baton-locked";
-}
-
-Status record_locks(const std::filesystem::path& folder, const std::string& job,
-                    const std::set<std::string>& files) {
-  const std::filesystem::path file = lock_file(folder);
-  BATON_ASSIGN(Locks locks, read_locks(file));
-  const Locks before = locks;
-  locks.erase(job);
-  if (!files.empty()) locks[job] = files;
+Status write_locks(const std::filesystem::path& file, const Locks& before, Locks locks) {
+  std::erase_if(locks, [](const auto& of_job) { return of_job.second.empty(); });
   if (locks == before) return {};
   std::string text;
   for (const auto& [id, names] : locks) {
@@ -58,6 +48,28 @@ Status record_locks(const std::filesystem::path& folder, const std::string& job,
   std::filesystem::remove(file, error);
   if (!error) return {};
   return Error{ErrorKind::io, fmt::format("{}: {}", file.string(), error.message())};
+}
+
+}  // namespace
+
+std::filesystem::path lock_file(const std::filesystem::path& folder) {
+  return folder / ".baton-locked";
+}
+
+Status record_locks(const std::filesystem::path& folder, const std::string& job,
+                    const std::set<std::string>& files) {
+  BATON_ASSIGN(const Locks before, read_locks(lock_file(folder)));
+  Locks locks = before;
+  locks[job] = files;
+  return write_locks(lock_file(folder), before, std::move(locks));
+}
+
+Status retain_locks(const std::filesystem::path& folder, const std::string& job,
+                    const std::set<std::string>& files) {
+  BATON_ASSIGN(const Locks before, read_locks(lock_file(folder)));
+  Locks locks = before;
+  std::erase_if(locks[job], [&](const std::string& file) { return !files.contains(file); });
+  return write_locks(lock_file(folder), before, std::move(locks));
 }
 
 Result<std::map<std::string, std::string>> locks_of_others(const std::filesystem::path& folder,

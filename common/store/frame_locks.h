@@ -19,6 +19,10 @@ std::filesystem::path lock_file(const std::filesystem::path& folder);
 Status record_locks(const std::filesystem::path& folder, const std::string& job,
                     const std::set<std::string>& files);
 
+/// Forgets what the folder's file says of a job but these. Errors as above.
+Status retain_locks(const std::filesystem::path& folder, const std::string& job,
+                    const std::set<std::string>& files);
+
 /// Names of the files that are locked by other jobs than `job`, and by which. Errors as above.
 Result<std::map<std::string, std::string>> locks_of_others(const std::filesystem::path& folder,
                                                            const std::string& job);

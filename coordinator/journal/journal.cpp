@@ -57,6 +57,30 @@ Result<Failure> read_failure(const SqlDatabase& database, const SqlStatement& ro
   return failure;
 }
 
+Status prepare_schema(SqlDatabase& database) {
+  BATON_ASSIGN(const std::int64_t version, database.pragma("user_version"));
+  BATON_ASSIGN(const std::int64_t application, database.pragma("application_id"));
+  BATON_ASSIGN(const std::int64_t schema_changes, database.pragma("schema_version"));
+
+  // A file without any table is new, or was left before its first commit.
+  if (schema_changes == 0) {
+    return database.execute(
+        fmt::format("BEGIN; {} PRAGMA user_version = {}; PRAGMA application_id = {}; COMMIT;",
+                    std::string(kSchema) + kLaterTables, kSchemaVersion, kApplicationId));
+  }
+  if (application != kApplicationId) {
+    return Error{
+        ErrorKind::corrupt,
+        fmt::format("{}: a database, but not a journal of a coordinator", database.name())};
+  }
+  if (version != kSchemaVersion) {
+    return Error{ErrorKind::version, fmt::format("{}: journal version {}, this program reads {}",
+                                                 database.name(), version, kSchemaVersion)};
+  }
+  for (const char* const table : kCheckedTables) BATON_TRY(database.check(table));
+  return database.execute(std::string(kLaterTables) + kIdentify);
+}
+
 }  // namespace
 
 // ---- opening ------------------------------------------------------------------------------------
@@ -64,34 +88,10 @@ Result<Failure> read_failure(const SqlDatabase& database, const SqlStatement& ro
 Result<Journal> Journal::open(const std::filesystem::path& path) {
   BATON_ASSIGN(SqlDatabase database, SqlDatabase::open(path));
   Journal journal(std::move(database));
-  BATON_TRY(journal.prepare_schema());
+  BATON_TRY(prepare_schema(journal.database_));
   BATON_TRY(journal.count_start());
   journal.database_.reserve_room();
   return journal;
-}
-
-Status Journal::prepare_schema() {
-  BATON_ASSIGN(const std::int64_t version, database_.pragma("user_version"));
-  BATON_ASSIGN(const std::int64_t application, database_.pragma("application_id"));
-  BATON_ASSIGN(const std::int64_t schema_changes, database_.pragma("schema_version"));
-
-  // A file without any table is new, or was left before its first commit.
-  if (schema_changes == 0) {
-    return database_.execute(
-        fmt::format("BEGIN; {} PRAGMA user_version = {}; PRAGMA application_id = {}; COMMIT;",
-                    std::string(kSchema) + kLaterTables, kSchemaVersion, kApplicationId));
-  }
-  if (application != kApplicationId) {
-    return Error{
-        ErrorKind::corrupt,
-        fmt::format("{}: a database, but not a journal of a coordinator", database_.name())};
-  }
-  if (version != kSchemaVersion) {
-    return Error{ErrorKind::version, fmt::format("{}: journal version {}, this program reads {}",
-                                                 database_.name(), version, kSchemaVersion)};
-  }
-  for (const char* const table : kCheckedTables) BATON_TRY(database_.check(table));
-  return database_.execute(std::string(kLaterTables) + kIdentify);
 }
 
 Status Journal::count_start() {
@@ -264,6 +264,18 @@ Result<std::set<Digest>> Journal::output_marks() {
   return std::set<Digest>(jobs.begin(), jobs.end());
 }
 
+Result<std::vector<std::string>> Journal::marked_folders(const Digest& job) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT folder FROM marked_folders WHERE job = ?"));
+  query.bind(job);
+  std::vector<std::string> folders;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return folders;
+    folders.push_back(query.text(0));
+  }
+}
+
 // ---- writing ------------------------------------------------------------------------------------
 
 /// A statement for reading, to be bound; sql: a literal.
@@ -355,9 +367,12 @@ Status Journal::record_frame_file(const Digest& job, const FrameFile& file) {
 
 Status Journal::record_output_mark(const Digest& job, const std::optional<std::string>& folder) {
   if (!folder) return change("DELETE FROM output_marks WHERE job = ?", job);
-  BATON_TRY(
-      change("INSERT OR IGNORE INTO marked_folders (folder, job) VALUES (?, ?)", *folder, job));
+  BATON_TRY(record_marked_folder(job, *folder));
   return change("INSERT OR IGNORE INTO output_marks (job) VALUES (?)", job);
+}
+
+Status Journal::record_marked_folder(const Digest& job, const std::string& folder) {
+  return change("INSERT OR IGNORE INTO marked_folders (folder, job) VALUES (?, ?)", folder, job);
 }
 
 Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks) {

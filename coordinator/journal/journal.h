@@ -136,6 +136,9 @@ class Journal {
   Status record_frame_file(const Digest& job, const FrameFile& file);
   /// folder: that is marked now; nullopt: the mark goes.
   Status record_output_mark(const Digest& job, const std::optional<std::string>& folder);
+  /// What a job's output folder was, without links, when it was marked or a frame locked in it.
+  Result<std::vector<std::string>> marked_folders(const Digest& job);
+  Status record_marked_folder(const Digest& job, const std::string& folder);
   /// Forgets that these tasks were done.
   Status record_reopened(const Digest& job, const std::vector<TaskKey>& tasks);
 
@@ -151,7 +154,6 @@ class Journal {
   Result<std::optional<Bytes>> archived_detail(const Digest& job);
   /// Summaries of the newest `count` jobs in the archive, the oldest first.
   Result<std::vector<Bytes>> archived_summaries(int count);
-  Result<std::uint64_t> num_archived();
   /// The jobs, in the archive or not, or those of this name, that know a folder by a name of which
   /// is_it(name) is true, or have marked one that had it; in the order of submission.
   Result<std::vector<Digest>> jobs_in(const std::function<bool(const std::string&)>& is_it,
@@ -207,7 +209,6 @@ class Journal {
 
  private:
   explicit Journal(SqlDatabase database) : database_(std::move(database)) {}
-  Status prepare_schema();
   Status count_start();
   Status visit_recorded(const Digest& job, const std::function<Status(const Completion&)>& visit);
   Status visit_archived(const Digest& job, const std::function<Status(const Completion&)>& visit);

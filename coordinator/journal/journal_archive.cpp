@@ -119,12 +119,6 @@ Result<std::vector<Bytes>> Journal::archived_summaries(int count) {
   }
 }
 
-Result<std::uint64_t> Journal::num_archived() {
-  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT count(*) FROM archive"));
-  BATON_ASSIGN(const bool row, query.step());
-  return row ? static_cast<std::uint64_t>(query.integer(0)) : 0;
-}
-
 Result<std::vector<Digest>> Journal::jobs_in(const std::function<bool(const std::string&)>& is_it,
                                              const std::optional<std::string>& name) {
   BATON_ASSIGN(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "common/base/legible.h"
 #include "coordinator/journal/journal.h"
 
 namespace baton {
@@ -179,10 +180,11 @@ Result<std::vector<FarmEvent>> Journal::events(const EventQuery& wanted) {
     // A later program may tell more kinds of events than this one knows.
     if (kind < 0 || kind > static_cast<std::int64_t>(last_of(event.kind))) continue;
     event.kind = static_cast<FarmEventKind>(kind);
-    event.actor = query.text(3);
+    event.actor = legible_line(query.text(3));
     event.job = JobId::from_hex(query.text(4)).value_or(JobId());
-    event.worker = query.text(5);
-    event.reason = query.text(6);
+    event.worker = legible_line(query.text(5));
+    // What is told of a worker is its name and host, a line.
+    event.reason = event.job.empty() ? legible_line(query.text(6)) : query.text(6);
     event.seconds = query.real(7);
     event.has_task = !query.is_null(8);
     const std::int64_t task = query.integer(8);

@@ -78,7 +78,8 @@ inline constexpr const char* kSchema = R"sql(
 /// which of its frames count as done whatever is in their files, `priorities` which priority a
 /// person has set in place of the one that is written in its document, `growth` how it has come by
 /// its sweeps. `pictures_given_up` are those that a job may replace though no job has written them;
-/// `marked_folders` what output folders were, without links, when a job marked them.
+/// `marked_folders` what output folders were, without links, when a job marked them, or a frame in
+/// them was locked.
 /// `events` is appended to alone (FarmEvent), without an index, which would cost more than it
 /// saves; its last row stays, so that no number is given twice. Of those that are old, `event_sums`
 /// keeps count and seconds.

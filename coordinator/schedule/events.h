@@ -96,11 +96,12 @@ struct JobAdded {
 struct JobCancelled {
   Digest job;
 };
-/// Another job's frames take the place of some of this one's: it ends, and those are gone; none
-/// where they are of the same picture.
+/// Another job, or a later version of it, takes the place of this one: it ends, and these frames
+/// are gone; none where they are of the same picture. reason: for people, who does.
 struct JobSuperseded {
   Digest job;
   std::vector<TaskKey> replaced;
+  std::string reason = "another job takes its place";
 };
 /// No more of its tasks are granted until it is resumed; what is leased goes on.
 /// waits: for what, where it is not a person who wants it so.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "common/base/size_text.h"
 #include "coordinator/schedule/held_states.h"
@@ -65,6 +66,14 @@ std::vector<Cause> shortened(std::vector<Cause> chain) {
   return chain;
 }
 
+Cause running_of(const Lease& lease) {
+  return {.kind = ReasonKind::running,
+          .job = lease.id.job,
+          .task = lease.id.task,
+          .workers = {lease.worker},
+          .since = lease.granted_at};
+}
+
 std::string room_text(const Scheduler& scheduler, const Scheduler::Job& job) {
   const JobGraph& graph = job.tasks.graph();
   return fmt::format(
@@ -97,8 +106,9 @@ std::vector<Cause> Reasons::of_worker(const std::string& worker) const {
   if (!leases.knows(worker)) return {{.kind = ReasonKind::gone}};
   Chain chain;
   for (const LeaseBook::Place& place : leases.of_worker(worker))
-    chain.push_back(lease_of(leases.at(place)));
-  if (draining_.contains(worker))
+    chain.push_back(running_of(leases.at(place)));
+  if (is_silent(worker)) chain.push_back(silence_of({worker}));
+  if (conduct_.draining.contains(worker))
     chain.push_back({.kind = ReasonKind::draining, .workers = {worker}});
   if (!chain.empty()) return chain;
   for (const Digest& digest : scheduler_.in_turn()) {
@@ -112,7 +122,12 @@ std::vector<Cause> Reasons::of_worker(const std::string& worker) const {
       std::ranges::copy(of_job(digest), std::back_inserter(chain));
     }
   }
-  if (chain.empty()) chain.push_back({.kind = ReasonKind::no_job, .workers = {worker}});
+  if (!chain.empty()) return chain;
+  chain.push_back({.kind = ReasonKind::no_job, .workers = {worker}});
+  std::ranges::copy_if(scheduler_.jobs(), std::back_inserter(chain.back().jobs),
+                       [&](const Digest& digest) {
+                         return scheduler_.find_job(digest)->status == JobStatus::paused;
+                       });
   return chain;
 }
 
@@ -140,7 +155,7 @@ Reasons::Chain Reasons::walk(const Digest& digest, const Scheduler::Job& job,
     const TaskStatus status = job.tasks.book().status(task);
     std::optional<TaskIndex> next;
     if (status == TaskStatus::leased) {
-      chain.push_back(lease_of(scheduler_.leases().at({digest, task})));
+      explain_lease(scheduler_.leases().at({digest, task}), chain);
       return chain;
     }
     if (status == TaskStatus::blocked) {
@@ -201,8 +216,8 @@ std::optional<Cause> Reasons::nobody_for(const Digest& digest, const Scheduler::
     cause.kind = ReasonKind::tried;
     return cause;
   }
-  if (std::ranges::all_of(alike,
-                          [&](const auto& w) { return draining_.contains(w) || is_blind(w); })) {
+  if (std::ranges::all_of(
+          alike, [&](const auto& w) { return conduct_.draining.contains(w) || is_blind(w); })) {
     cause.kind = ReasonKind::draining;
     return cause;
   }
@@ -241,7 +256,7 @@ std::optional<TaskIndex> Reasons::explain_ready(const Digest& digest, const Sche
                               ? "does not render with " + cause->text
                           : cause->kind == ReasonKind::blind ? "does not see " + cause->text
                                                              : "rests from it after failures";
-    } else if (!draining_.contains(worker) && job.is_due(task, worker, crew)) {
+    } else if (!conduct_.draining.contains(worker) && job.is_due(task, worker, crew)) {
       able.push_back(worker);
     }
   }
@@ -259,12 +274,19 @@ std::optional<TaskIndex> Reasons::explain_ready(const Digest& digest, const Sche
     chain.push_back({.kind = ReasonKind::held, .job = digest, .task = key, .workers = readers});
     if (readers.empty()) readers = able;
   }
+  const auto has_none = [&](const auto& w) { return leases.of_worker(w).empty(); };
   const auto free = std::ranges::find_if(
-      readers, [&](const auto& w) { return leases.wants(w) || leases.of_worker(w).empty(); });
+      readers, [&](const auto& w) { return !is_silent(w) && (leases.wants(w) || has_none(w)); });
   if (free != readers.end()) {
     explain_free(digest, job, task, *free, chain);
+    return std::nullopt;
+  }
+  std::vector<std::string> busy = readers;
+  std::erase_if(busy, has_none);
+  if (busy.empty()) {
+    chain.push_back(silence_of(readers));
   } else {
-    explain_busy(digest, key, readers, chain);
+    explain_busy(digest, key, busy, chain);
   }
   return std::nullopt;
 }
@@ -329,17 +351,28 @@ void Reasons::explain_busy(const Digest& digest, const TaskKey& task,
         busy.jobs.push_back(place.first);
     }
   }
-  const Cause end = lease_of(*oldest);
   chain.push_back(std::move(busy));
-  chain.push_back(end);
+  explain_lease(*oldest, chain);
 }
 
-Cause Reasons::lease_of(const Lease& lease) const {
-  return {.kind = ReasonKind::running,
-          .job = lease.id.job,
-          .task = lease.id.task,
-          .workers = {lease.worker},
-          .since = lease.granted_at};
+bool Reasons::is_silent(const std::string& worker) const {
+  return scheduler_.leases().silence_of(worker, now_) > conduct_.silent_after;
+}
+
+/// workers: at least one.
+Cause Reasons::silence_of(const std::vector<std::string>& workers) const {
+  TimePoint since = now_;
+  for (const std::string& worker : workers) {
+    const auto silence = scheduler_.leases().silence_of(worker, now_);
+    since = std::min(since, now_ - std::chrono::duration_cast<TimePoint::duration>(silence));
+  }
+  return {.kind = ReasonKind::silent, .workers = workers, .since = since};
+}
+
+/// A worker has the task, and may say nothing any more.
+void Reasons::explain_lease(const Lease& lease, Chain& chain) const {
+  chain.push_back(running_of(lease));
+  if (is_silent(lease.worker)) chain.push_back(silence_of({lease.worker}));
 }
 
 /// Why the worker gets nothing of the job, whatever is ready; nullopt: it may.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <set>
 #include <string>
@@ -20,21 +21,29 @@ struct Cause {
   std::vector<std::string> workers = {};
   /// A folder, a renderer, or what a disk said.
   std::string text = {};
-  std::optional<TimePoint> since = {};  ///< when the task was granted
-  std::size_t count = 0;                ///< of links that are left out
-  /// Of busy: whose tasks the workers have, each once.
+  /// When the task was granted; of silent: the last sign of life of the one that said nothing for
+  /// longest.
+  std::optional<TimePoint> since = {};
+  std::size_t count = 0;  ///< of links that are left out
+  /// Of busy: whose tasks the workers have, each once. Of no_job: those that are paused.
   std::vector<Digest> jobs = {};
   std::uint64_t need_bytes = 0, free_bytes = 0;
+};
+
+/// What only the one who talks with the workers knows of them.
+struct Conduct {
+  std::set<std::string> draining = {};  ///< who was told to take nothing new
+  /// Who says nothing for longer counts as silent.
+  std::chrono::milliseconds silent_after{std::chrono::hours(24)};
 };
 
 /// Why a scheduler does what it does, as chains of causes: from what somebody asks about to
 /// something that no other link explains (is_last). Pure: it reads the scheduler as it stands.
 class Reasons {
  public:
-  /// scheduler: outlives the reasons, and does not change meanwhile. draining: workers that were
-  /// told to take nothing new.
-  Reasons(const Scheduler& scheduler, TimePoint now, std::set<std::string> draining = {})
-      : scheduler_(scheduler), now_(now), draining_(std::move(draining)) {}
+  /// scheduler: outlives the reasons, and does not change meanwhile.
+  Reasons(const Scheduler& scheduler, TimePoint now, Conduct conduct = {})
+      : scheduler_(scheduler), now_(now), conduct_(std::move(conduct)) {}
 
   /// Why the job, which must be known, is not further: of its first frame that is not written.
   std::vector<Cause> of_job(const Digest& job) const;
@@ -42,6 +51,8 @@ class Reasons {
   std::vector<Cause> of_task(const Digest& job, TaskIndex task) const;
   /// What the worker does, or why it does nothing.
   std::vector<Cause> of_worker(const std::string& worker) const;
+  /// Whether a worker, which must be connected, says nothing any more.
+  bool is_silent(const std::string& worker) const;
 
  private:
   using Chain = std::vector<Cause>;
@@ -56,13 +67,14 @@ class Reasons {
                     const std::string& worker, Chain& chain) const;
   void explain_busy(const Digest& digest, const TaskKey& task,
                     const std::vector<std::string>& workers, Chain& chain) const;
-  Cause lease_of(const Lease& lease) const;
+  Cause silence_of(const std::vector<std::string>& workers) const;
+  void explain_lease(const Lease& lease, Chain& chain) const;
   std::optional<Cause> refusal(const std::string& worker, const Digest& digest,
                                const Scheduler::Job& job) const;
 
   const Scheduler& scheduler_;
   TimePoint now_;
-  std::set<std::string> draining_;
+  Conduct conduct_;
 };
 
 /// What the job, which must be known, cannot go on without; empty: it goes on, or has ended. Of a

@@ -114,7 +114,7 @@ void Scheduler::on(const JobCancelled& event, TimePoint, Actions& actions) {
 void Scheduler::on(const JobSuperseded& event, TimePoint, Actions& actions) {
   Job* job = find(event.job);
   if (!job) return;
-  const std::string reason = "frames of another job take the place of its own";
+  const std::string& reason = event.reason;
   if (is_open(job->status)) {
     end_job(event.job, *job, JobStatus::cancelled, reason, actions);
   } else if (job->status == JobStatus::done) {

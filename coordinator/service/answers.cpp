@@ -15,7 +15,9 @@ namespace baton {
 namespace {
 
 constexpr std::size_t kMostNames = 8;
-constexpr std::chrono::hours kLostFor{24};
+constexpr std::chrono::milliseconds kAbsentFor{std::chrono::hours(24)};
+/// Who was turned away and asks again does so sooner.
+constexpr std::chrono::minutes kAsksAgainWithin{1};
 
 /// "worker a", "workers a, b and 12 more".
 std::string names_text(const std::vector<std::string>& workers) {
@@ -28,12 +30,12 @@ std::string names_text(const std::vector<std::string>& workers) {
       workers.size() > kMostNames ? fmt::format(" and {} more", workers.size() - kMostNames) : "");
 }
 
-std::set<std::string> draining_workers(const FarmCore& farm) {
-  std::set<std::string> draining;
+Conduct conduct_of(const FarmCore& farm) {
+  Conduct conduct{.silent_after = 2 * farm.options.heartbeat};
   for (const WorkerSummary& worker : farm.peers.summaries()) {
-    if (worker.is_draining) draining.insert(worker.worker_id);
+    if (worker.is_draining) conduct.draining.insert(worker.worker_id);
   }
-  return draining;
+  return conduct;
 }
 
 /// What a task needs of another one.
@@ -42,6 +44,29 @@ std::string input_text(const TaskPlace& task, const TaskPlace& input) {
   if (task.kind == TaskKind::second_pass)
     return fmt::format("the first pass of tile {}", input.tile);
   return "the state of " + place_text(input);
+}
+
+/// Why a worker is not here.
+Reason absence_reason(const AbsentWorker& worker) {
+  Reason reason{.kind = ReasonKind::gone, .workers = {worker.worker_id}};
+  reason.since_ms = worker.since_ms;
+  const std::string why = worker.reason.empty() ? "" : ": " + worker.reason;
+  switch (worker.absence) {
+    case Absence::lost:
+      reason.text = fmt::format(
+          "worker {} was silent for too long and is lost; its tasks went to "
+          "others{}",
+          worker.worker_id, why);
+      break;
+    case Absence::turned_away:
+      reason.kind = ReasonKind::turned_away;
+      reason.text = fmt::format("worker {} is turned away{}", worker.worker_id, why);
+      break;
+    case Absence::left:
+      reason.text = fmt::format("worker {} has ended in order{}", worker.worker_id, why);
+      break;
+  }
+  return reason;
 }
 
 JobActivity activity_of(JobStatus status) {
@@ -65,7 +90,7 @@ JobActivity activity_of(JobStatus status) {
 Answers::Answers(const FarmCore& farm)
     : farm_(farm),
       now_(std::chrono::steady_clock::now()),
-      reasons_(farm.scheduler, now_, draining_workers(farm)) {}
+      reasons_(farm.scheduler, now_, conduct_of(farm)) {}
 
 // ---- jobs ---------------------------------------------------------------------------------------
 
@@ -155,8 +180,8 @@ JobList Answers::list_workers() const {
   list.task_seconds = farm_.scheduler.longest_task_seconds();
   for (WorkerSummary& worker : farm_.peers.summaries())
     list.workers.push_back(describe(std::move(worker)));
-  list.lost = farm_.history.past().lost(
-      now_ms() - std::chrono::duration_cast<std::chrono::milliseconds>(kLostFor).count());
+  list.turned_away = farm_.peers.turned_away().asked_within(kAbsentFor, now_);
+  list.lost = farm_.history.past().lost(now_ms() - kAbsentFor.count());
   return list;
 }
 
@@ -179,11 +204,10 @@ WorkerSummary Answers::describe(WorkerSummary worker) const {
   }
   if (!leases.knows(name)) return worker;
   worker.silent_s = leases.silence_of(name, now_).count();
-  const double two_heartbeats = 2 * std::chrono::duration<double>(farm_.options.heartbeat).count();
-  worker.activity = worker.silent_s > two_heartbeats ? WorkerActivity::silent
-                    : worker.is_draining             ? WorkerActivity::draining
-                    : worker.tasks.empty()           ? WorkerActivity::idle
-                                                     : WorkerActivity::rendering;
+  worker.activity = reasons_.is_silent(name) ? WorkerActivity::silent
+                    : worker.is_draining     ? WorkerActivity::draining
+                    : worker.tasks.empty()   ? WorkerActivity::idle
+                                             : WorkerActivity::rendering;
   return worker;
 }
 
@@ -193,13 +217,12 @@ Result<ReasonChain> Answers::why_worker(const std::string& worker) const {
     for (const Cause& cause : reasons_.of_worker(worker)) chain.reasons.push_back(reason_of(cause));
     return chain;
   }
-  for (const LostWorker& lost : farm_.history.past().lost(0)) {
-    if (lost.worker_id != worker) continue;
-    chain.reasons.push_back({.kind = ReasonKind::gone,
-                             .text = fmt::format("worker {} was silent for too long and is lost; "
-                                                 "its tasks went to others",
-                                                 worker),
-                             .since_ms = lost.lost_ms});
+  const std::vector<AbsentWorker> asked = farm_.peers.turned_away().asked_within(kAbsentFor, now_);
+  const auto turned_away = std::ranges::find(asked, worker, &AbsentWorker::worker_id);
+  const AbsentWorker* const absent =
+      turned_away != asked.end() ? &*turned_away : farm_.history.past().absent(worker);
+  if (absent != nullptr) {
+    chain.reasons.push_back(absence_reason(*absent));
     return chain;
   }
   return Error{ErrorKind::bad_input, fmt::format("worker '{}': no worker has this name", worker)};
@@ -226,18 +249,6 @@ std::vector<ListedTask> Answers::tasks_in_hand(const Digest& version) const {
   return tasks;
 }
 
-ListedTask Answers::failed_task(const Digest& version, const Failure& failure) const {
-  ListedTask task{.job = id_of(version),
-                  .task = {},
-                  .worker = failure.worker,
-                  .has_failed = true,
-                  .message = failure.message};
-  const Scheduler::Job* const job = farm_.scheduler.find_job(version);
-  task.has_task = job != nullptr && job->tasks.graph().find(failure.lease.task).has_value();
-  if (task.has_task) task.task = place_of(*job, failure.lease.task, failure.lease.attempt);
-  return task;
-}
-
 // ---- causes in words ----------------------------------------------------------------------------
 
 Reason Answers::reason_of(const Cause& cause) const {
@@ -258,9 +269,16 @@ Reason Answers::reason_of(const Cause& cause) const {
   }
   if (cause.since) {
     reason.seconds = std::chrono::duration<double>(now_ - *cause.since).count();
-    reason.usual = past.usual(reason.job, reason.task.kind);
+    if (cause.kind == ReasonKind::running) reason.usual = past.usual(reason.job, reason.task.kind);
   }
-  if (cause.kind == ReasonKind::no_worker) reason.since_ms = past.alone_since_ms();
+  if (cause.kind == ReasonKind::no_worker) {
+    reason.since_ms = past.alone_since_ms();
+    for (const AbsentWorker& worker :
+         farm_.peers.turned_away().asked_within(kAsksAgainWithin, now_))
+      reason.workers.push_back(worker.worker_id);
+  }
+  if (cause.kind == ReasonKind::no_job && !cause.jobs.empty())
+    reason.job = id_of(cause.jobs.front());
   return reason;
 }
 
@@ -277,6 +295,26 @@ std::string Answers::pause_text(const Digest& version, const std::string& waits)
     return "by a person";
   return fmt::format("by {}{}", change->actor == farm_.owner_of(version) ? "its owner " : "",
                      change->actor);
+}
+
+/// Of an idle worker.
+std::string Answers::paused_text(const std::vector<Digest>& jobs) const {
+  if (jobs.empty()) return {};
+  const Digest& first = jobs.front();
+  const std::string why = pause_text(first, farm_.scheduler.find_job(first)->waits);
+  const std::string name = farm_.history.name_of(first);
+  if (jobs.size() == 1) return fmt::format("; job {} is paused: {}", name, why);
+  return fmt::format("; {} jobs are paused, job {} for one: {}", jobs.size(), name, why);
+}
+
+/// Where nobody is connected.
+std::string Answers::turned_away_text() const {
+  std::vector<std::string> names;
+  const auto asked = farm_.peers.turned_away().asked_within(kAsksAgainWithin, now_);
+  for (const AbsentWorker& worker : asked) names.push_back(worker.worker_id);
+  if (names.empty()) return {};
+  return fmt::format("; {} {} and turned away: {}", names_text(names),
+                     names.size() > 1 ? "are there" : "is there", asked.front().reason);
 }
 
 std::string Answers::busy_text(const Cause& cause) const {
@@ -329,7 +367,7 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::running:
       return fmt::format("{} is with {}", place(cause), who);
     case ReasonKind::no_worker:
-      return "no worker is connected";
+      return "no worker is connected" + turned_away_text();
     case ReasonKind::renderer:
       return fmt::format("{} is for who renders with {}; {} not", place(cause), cause.text,
                          who + (many ? " do" : " does"));
@@ -356,9 +394,13 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::inspecting:
       return "all tasks are done, and the frames are read once more";
     case ReasonKind::no_job:
-      return "no job that runs has a task left";
+      return "no job that runs has a task left" + paused_text(cause.jobs);
     case ReasonKind::gone:
       return "the worker is not connected";
+    case ReasonKind::silent:
+      return fmt::format("{} {} said nothing", who, many ? "have" : "has");
+    case ReasonKind::turned_away:
+      return who + " may not come in";
   }
   return {};
 }

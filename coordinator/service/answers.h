@@ -27,8 +27,6 @@ class Answers {
   Result<ReasonChain> why_worker(const std::string& worker) const;
   /// The tasks of a job that workers have now.
   std::vector<ListedTask> tasks_in_hand(const Digest& version) const;
-  /// An attempt that has failed.
-  ListedTask failed_task(const Digest& version, const Failure& failure) const;
 
  private:
   Result<std::vector<Cause>> causes_of(const Digest& version, const AskWhy& question) const;
@@ -37,6 +35,8 @@ class Answers {
   Reason end_reason(const Digest& version, JobStatus status) const;
   std::string text_of(const Cause& cause) const;
   std::string pause_text(const Digest& version, const std::string& waits) const;
+  std::string paused_text(const std::vector<Digest>& jobs) const;
+  std::string turned_away_text() const;
   std::string busy_text(const Cause& cause) const;
   std::string place(const Cause& cause) const;
   JobId id_of(const Digest& version) const { return farm_.history.jobs().of(version).id; }

@@ -110,19 +110,12 @@ Status History::locked(const Digest& version, const std::vector<FrameNumber>& fr
 }
 
 Status History::prioritized(const Digest& version, std::int32_t before,
-                            const PriorityChange& priority) {
+                            const PriorityChange& priority, const std::string& why) {
   const JobId job = jobs_.of(version).id;
   BATON_TRY(jobs_.set_priority(journal_, job, priority));
   return tell({.kind = FarmEventKind::priority_changed,
                .job = job,
-               .reason = fmt::format("{}, it was {}", priority.wanted, before)});
-}
-
-Result<std::int32_t> History::priority_of(const Digest& version, std::int32_t written) {
-  const JobId job = jobs_.of(version).id;
-  const std::int32_t priority = jobs_.priority(job, written);
-  if (priority == written) BATON_TRY(jobs_.set_priority(journal_, job, {written, written}));
-  return priority;
+               .reason = fmt::format("{}, it was {}{}", priority.wanted, before, why)});
 }
 
 Status History::granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker,

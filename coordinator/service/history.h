@@ -28,16 +28,19 @@ class History {
   std::string name_of(const Digest& version) const;
 
   /// The document is the job's newest version, and runs, from now on.
+  /// reason: of the submission; of a job that is known, what becomes another comes after it.
   Status submitted(const Digest& document, const JobId& job, const std::string& reason);
   Status status_changed(const Digest& version, JobStatus status, const std::string& reason);
   Status deleted(const Digest& version);
   /// Frames of the job count as done from now on, or no longer.
   Status locked(const Digest& version, const std::vector<FrameNumber>& frames, bool is_locked);
-  /// The job has another priority from now on. before: the one it had; written: in its document.
-  Status prioritized(const Digest& version, std::int32_t before, const PriorityChange& priority);
-  /// The priority of a job whose document, which was submitted now, says `written`: one that was
-  /// set before counts while documents say what they said then.
-  Result<std::int32_t> priority_of(const Digest& version, std::int32_t written);
+  /// The job has another priority from now on. before: the one it had; why: what is said of that.
+  Status prioritized(const Digest& version, std::int32_t before, const PriorityChange& priority,
+                     const std::string& why = {});
+  /// What was set of a job's priority counts no more.
+  Status forget_priority(const Digest& version, std::int32_t written) {
+    return jobs_.set_priority(journal_, jobs_.of(version).id, {written, written});
+  }
   Status granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker,
                  const std::string& reason = {});
   /// job: null: it is forgotten.

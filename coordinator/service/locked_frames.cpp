@@ -12,6 +12,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/store/frame_locks.h"
+#include "coordinator/service/farm_document.h"
 
 namespace baton {
 
@@ -76,32 +77,77 @@ std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNu
   return files;
 }
 
-void tell_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id,
-                const Roots& roots) {
-  if (!check_output_root(spec, roots)) return;
-  const Status written =
-      record_locks(spec.output.directory, id.hex(), frame_files(spec, jobs.locked(id)));
+Status tell_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs, const JobId& id,
+                  const Roots& roots) {
+  if (!check_output_root(spec, roots)) return {};
+  const std::set<std::string> files = frame_files(spec, jobs.locked(id));
+  const Status written = record_locks(spec.output.directory, id.hex(), files);
   if (!written)
     spdlog::warn("locks are not known to other coordinators: {}", written.error().message);
+  // The folder's name may lead elsewhere tomorrow.
+  const std::string today = resolve_folder(spec.output.directory);
+  const std::vector<Digest> versions = jobs.versions(id);
+  if (!files.empty() && !versions.empty())
+    BATON_TRY(journal.record_marked_folder(versions.back(), today));
+  for (const Digest& version : versions) {
+    BATON_ASSIGN(const std::vector<std::string> folders, journal.marked_folders(version));
+    for (const std::string& folder : folders) {
+      if (folder == today) continue;
+      if (const Status left = retain_locks(folder, id.hex(), files); !left)
+        spdlog::warn("locks stay for other coordinators: {}", left.error().message);
+    }
+  }
+  return {};
+}
+
+void drop_stale_locks(const JobSpec& spec, const IdentityBook& jobs) {
+  const auto locks = locks_of_others(spec.output.directory, {});
+  if (!locks) return;
+  std::set<JobId> stale;
+  for (const auto& [file, job] : *locks) {
+    const std::optional<JobId> id = JobId::from_hex(job);
+    if (id && !jobs.versions(*id).empty() && jobs.locked(*id).empty()) stale.insert(*id);
+  }
+  for (const JobId& job : stale) {
+    if (const Status dropped = retain_locks(spec.output.directory, job.hex(), {}); !dropped)
+      spdlog::warn("locks stay for other coordinators: {}", dropped.error().message);
+  }
+}
+
+Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,
+                       const std::string& other_name) {
+  const std::string which = format_frames(frames);
+  return {ErrorKind::bad_input,
+          fmt::format("job '{}': frames {} in {} are locked in job {}, and stay: `baton job lock "
+                      "{} --off --frames {}` unlocks them, another output.directory keeps them",
+                      job.name, which, job.output.directory, other_name, other_name, which)};
 }
 
 Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id) {
   const auto locks = locks_of_others(spec.output.directory, id.hex());
   if (!locks) return Error{ErrorKind::io, locks.error().message};
-  std::vector<FrameNumber> frames;
+  std::vector<FrameNumber> strange;
+  std::map<JobId, std::vector<FrameNumber>> known;
   for (const FrameNumber frame : spec.frames) {
     const auto lock = locks->find(frame_file_name(spec.output.pattern, frame.value()));
     if (lock == locks->end()) continue;
     const std::optional<JobId> other = JobId::from_hex(lock->second);
-    if (!other || jobs.versions(*other).empty()) frames.push_back(frame);
+    if (!other || jobs.versions(*other).empty()) {
+      strange.push_back(frame);
+    } else if (!jobs.locked(*other).empty()) {
+      // It may be under another name that the folder had.
+      known[*other].push_back(frame);
+    }
   }
-  if (frames.empty()) return {};
+  if (!known.empty())
+    return locked_elsewhere(spec, known.begin()->second, known.begin()->first.short_hex());
+  if (strange.empty()) return {};
   return Error{
       ErrorKind::bad_input,
       fmt::format("job '{}': frames {} in {} are locked by a job of another coordinator, and stay: "
                   "unlock them there or, if it is gone, remove {}; another output.directory keeps "
                   "them",
-                  spec.name, format_frames(frames), spec.output.directory,
+                  spec.name, format_frames(strange), spec.output.directory,
                   lock_file(spec.output.directory).string())};
 }
 

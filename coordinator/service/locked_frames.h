@@ -41,11 +41,20 @@ Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
                                                const Scheduler::Job* job);
 /// Names of the files of frames, in the job's folder.
 std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNumber>& frames);
-/// Writes the locks of a job into its output folder, for other coordinators; where that cannot be
-/// written, they do not learn of them.
-void tell_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id, const Roots& roots);
-/// Errors: bad_input, jobs have locked frames of this one that only another coordinator knows; io,
-/// what the folder says of that cannot be read.
+/// Writes the locks of a job into its output folder, for other coordinators, and takes those off
+/// that stand in folders to which its name led before and are no more. Where that cannot be
+/// written, they do not learn of it. Errors: the journal's.
+Status tell_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs, const JobId& id,
+                  const Roots& roots);
+/// Takes locks of jobs that are known, and have none any more, off the job's output folder: it may
+/// have had another name when they were put there.
+void drop_stale_locks(const JobSpec& spec, const IdentityBook& jobs);
+/// Why a job is refused that would replace frames that are locked in another one. other_name:
+/// short, of that job.
+Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,
+                       const std::string& other_name);
+/// By what stands in the folder. Errors: bad_input, another job has locked frames of this one; io,
+/// it cannot be read.
 Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id);
 /// Error (bad_input): some of these frames are not among those that are locked in the job.
 Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,

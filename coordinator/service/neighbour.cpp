@@ -41,14 +41,6 @@ std::string differing_text(const std::vector<std::string>& differing) {
   return fmt::format("{}{}", fmt::join(shown, ", "), differing.size() > kMost ? ", ..." : "");
 }
 
-Error locked_elsewhere(const JobSpec& job, const Neighbour& other, const std::string& other_name) {
-  return {ErrorKind::bad_input,
-          fmt::format("job '{}': frames {} in {} are locked in job {}, and stay: `baton job lock "
-                      "{} --off --frames {}` unlocks them, another output.directory keeps them",
-                      job.name, format_frames(other.locked), job.output.directory, other_name,
-                      other_name, format_frames(other.locked))};
-}
-
 Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job,
                       const std::string& other_name) {
   std::string text = fmt::format(

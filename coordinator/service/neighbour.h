@@ -40,8 +40,6 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
 
 /// Some of what differs, for people.
 std::string differing_text(const std::vector<std::string>& differing);
-/// Why a job is refused that would replace frames that are locked in another one.
-Error locked_elsewhere(const JobSpec& job, const Neighbour& other, const std::string& other_name);
 /// Why a job is refused whose frames would replace those of another picture. other_name: short, of
 /// that job.
 Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job,

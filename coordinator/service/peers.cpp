@@ -16,6 +16,7 @@ void Peers::add(const PeerId& peer, const WorkerHello& hello) {
   remove(hello.worker_id);
   workers_[hello.worker_id] = {peer, hello, drains};
   names_[peer] = hello.worker_id;
+  turned_away_.remove(hello);
 }
 
 void Peers::remove(const std::string& worker) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/protocol/router.h"
+#include "coordinator/service/turned_away.h"
 
 namespace baton {
 
@@ -16,6 +17,11 @@ class Peers {
   /// Introduces or replaces a worker.
   void add(const PeerId& peer, const WorkerHello& hello);
   void remove(const std::string& worker);
+  /// It may not come in now. Returns when it asked first.
+  TimePoint turn_away(const WorkerHello& hello, const std::string& reason, TimePoint now) {
+    return turned_away_.add(hello, reason, now);
+  }
+  const TurnedAway& turned_away() const { return turned_away_; }
   /// It was told to finish; that stays so when it connects again.
   void drain(const std::string& worker) { workers_.at(worker).is_draining = true; }
   /// The ID by which a worker goes here: its name, or where another process has that, the name and
@@ -43,6 +49,7 @@ class Peers {
   };
   std::map<std::string, Entry> workers_;
   std::map<PeerId, std::string> names_;
+  TurnedAway turned_away_;
 };
 
 /// Remembers connections, so that each is told or complained about once. Bounded: forgets all when

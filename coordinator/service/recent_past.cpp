@@ -7,9 +7,9 @@ namespace baton {
 std::uint64_t RecentPast::kinds() {
   std::uint64_t kinds = 0;
   using enum FarmEventKind;
-  for (const FarmEventKind kind :
-       {coordinator_started, job_submitted, job_changed, job_resumed, job_paused, job_done,
-        job_failed, job_cancelled, job_deleted, worker_joined, worker_left, worker_lost})
+  for (const FarmEventKind kind : {coordinator_started, job_submitted, job_changed, job_resumed,
+                                   job_paused, job_done, job_failed, job_cancelled, job_deleted,
+                                   worker_joined, worker_left, worker_lost, worker_drained})
     kinds |= bit_of(kind);
   return kinds;
 }
@@ -17,8 +17,9 @@ std::uint64_t RecentPast::kinds() {
 void RecentPast::add(const FarmEvent& event) {
   switch (event.kind) {
     case FarmEventKind::coordinator_started:
+      // Nobody came since the last one went, whoever was the coordinator then.
+      if (!connected_.empty() || alone_since_ms_ == 0) alone_since_ms_ = event.time_ms;
       connected_.clear();
-      alone_since_ms_ = event.time_ms;
       break;
     case FarmEventKind::job_deleted:
       times_.erase(event.job);
@@ -41,20 +42,17 @@ void RecentPast::add(const FarmEvent& event) {
       break;
     }
     case FarmEventKind::worker_joined:
-      connected_[event.worker] = event;
-      lost_.erase(event.worker);
+      connected_[event.worker] = {event.time_ms, event.reason};
+      absent_.erase(event.worker);
+      break;
+    case FarmEventKind::worker_drained:
+      if (const auto here = connected_.find(event.worker); here != connected_.end())
+        here->second.is_draining = true;
       break;
     case FarmEventKind::worker_left:
-    case FarmEventKind::worker_lost: {
-      const auto joined = connected_.extract(event.worker);
-      if (connected_.empty()) alone_since_ms_ = event.time_ms;
-      if (event.kind == FarmEventKind::worker_left) break;
-      if (lost_.size() >= kMostLost) lost_.clear();
-      LostWorker& lost = lost_[event.worker];
-      lost = {event.worker, joined ? joined.mapped().reason : std::string(),
-              joined ? joined.mapped().time_ms : 0, event.time_ms};
+    case FarmEventKind::worker_lost:
+      end_worker(event);
       break;
-    }
     default:
       break;
   }
@@ -81,13 +79,31 @@ const FarmEvent* RecentPast::last_change(const JobId& job) const {
   return found == changes_.end() ? nullptr : &found->second;
 }
 
-std::vector<LostWorker> RecentPast::lost(std::int64_t since_ms) const {
-  std::vector<LostWorker> result;
-  for (const auto& [name, worker] : lost_) {
-    if (worker.lost_ms >= since_ms) result.push_back(worker);
+void RecentPast::end_worker(const FarmEvent& event) {
+  const auto joined = connected_.extract(event.worker);
+  if (joined && connected_.empty()) alone_since_ms_ = event.time_ms;
+  if (absent_.size() >= kMostAbsent) absent_.clear();
+  AbsentWorker& worker = absent_[event.worker];
+  worker = {.worker_id = event.worker, .reason = event.reason, .since_ms = event.time_ms};
+  if (event.kind == FarmEventKind::worker_left) worker.absence = Absence::left;
+  if (!joined) return;
+  worker.about = joined.mapped().about;
+  worker.joined_ms = joined.mapped().time_ms;
+  if (joined.mapped().is_draining && worker.reason.empty()) worker.reason = "it was told to finish";
+}
+
+std::vector<AbsentWorker> RecentPast::lost(std::int64_t since_ms) const {
+  std::vector<AbsentWorker> result;
+  for (const auto& [name, worker] : absent_) {
+    if (worker.absence == Absence::lost && worker.since_ms >= since_ms) result.push_back(worker);
   }
-  std::ranges::stable_sort(result, std::greater(), &LostWorker::lost_ms);
+  std::ranges::stable_sort(result, std::greater(), &AbsentWorker::since_ms);
   return result;
+}
+
+const AbsentWorker* RecentPast::absent(const std::string& worker) const {
+  const auto found = absent_.find(worker);
+  return found == absent_.end() ? nullptr : &found->second;
 }
 
 }  // namespace baton

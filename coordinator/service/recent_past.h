@@ -30,17 +30,25 @@ class RecentPast {
   /// The event that last changed the job's status; nullptr: none is known.
   const FarmEvent* last_change(const JobId& job) const;
   /// Workers that were lost at this time or later and have not come again, the newest first.
-  std::vector<LostWorker> lost(std::int64_t since_ms) const;
+  std::vector<AbsentWorker> lost(std::int64_t since_ms) const;
+  /// What became of a worker that was lost or has left; nullptr: it is here, or not known.
+  const AbsentWorker* absent(const std::string& worker) const;
   /// Since when nobody is connected, as far as it is known; 0: it is not, or somebody is.
   std::int64_t alone_since_ms() const { return connected_.empty() ? alone_since_ms_ : 0; }
 
  private:
-  static constexpr std::size_t kMostLost = 1000;
+  static constexpr std::size_t kMostAbsent = 1000;
+  void end_worker(const FarmEvent& event);
 
   std::map<JobId, std::array<std::deque<double>, 3>> times_;  ///< by TaskKind
   std::map<JobId, FarmEvent> changes_;
-  std::map<std::string, FarmEvent> connected_;  ///< their arrivals
-  std::map<std::string, LostWorker> lost_;
+  struct Arrival {
+    std::int64_t time_ms = 0;
+    std::string about = {};
+    bool is_draining = false;
+  };
+  std::map<std::string, Arrival> connected_;
+  std::map<std::string, AbsentWorker> absent_;
   std::int64_t alone_since_ms_ = 0;
 };
 

@@ -75,12 +75,31 @@ Status Service::run(const std::atomic<bool>& stop) {
   waits_ = std::make_unique<FileWaits>(farm_.options.disk, [this] { farm_.router.wake(); });
   while (!stop && !stop_requested_) BATON_TRY(turn());
   waits_.reset();
-  if (!stop_requested_) BATON_TRY(farm_.history.happened(FarmEventKind::coordinator_stopped));
+  const std::vector<PeerId> workers = farm_.peers.connections();
+  if (stop_requested_) {
+    BATON_TRY(send_home());
+  } else {
+    BATON_TRY(farm_.history.happened(FarmEventKind::coordinator_stopped));
+  }
   BATON_TRY(farm_.journal.commit());
   // Who is told to stop the farm sends the workers home; who is merely ended, by a signal, will be
   // started again, and the workers wait for that.
   if (stop_requested_) {
-    for (const PeerId& worker : farm_.peers.connections()) farm_.router.send(worker, Shutdown{});
+    for (const PeerId& worker : workers) farm_.router.send(worker, Shutdown{});
+  }
+  return {};
+}
+
+/// Ends what workers have and are, before they are told to end.
+Status Service::send_home() {
+  // Nobody gets what another one leaves.
+  for (const WorkerSummary& worker : farm_.peers.summaries())
+    BATON_TRY(farm_.step(WorkRequested{worker.worker_id, 0}));
+  for (const WorkerSummary& worker : farm_.peers.summaries()) {
+    farm_.peers.remove(worker.worker_id);
+    BATON_TRY(farm_.step(WorkerLeft{worker.worker_id}));
+    BATON_TRY(farm_.history.happened(FarmEventKind::worker_left, worker.worker_id,
+                                     "the farm was stopped"));
   }
   return {};
 }
@@ -137,19 +156,7 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
     return farm_.refuse(peer, {ErrorKind::timeout, "the farm is full: " + *lack});
   }
   if (const std::optional<std::string> difference = other_build(hello)) {
-    if (!farm_.options.mixed_builds) {
-      if (may_be_alone_soon(hello)) {
-        tell("not let in now: " + *difference);
-        return farm_.refuse(
-            peer, {ErrorKind::timeout, *difference + "; asked again, since that one may be gone"});
-      }
-      tell("refused: " + *difference);
-      return farm_.refuse(
-          peer, {ErrorKind::version,
-                 fmt::format("{}; pixels may differ: use one build on all machines, or start "
-                             "the coordinator with --mixed-builds",
-                             *difference)});
-    }
+    if (!farm_.options.mixed_builds) return turn_away(peer, hello, *difference);
     if (is_new) spdlog::warn("{}: results may differ", *difference);
   }
 
@@ -165,22 +172,26 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
                                       farm_.store_directory.string(), farm_.token}));
   // A process that has only become impatient may not have received yet what it was granted.
   if (!is_new) return farm_.step(WorkerAlive{hello.worker_id, hello.running});
-  BATON_TRY(farm_.history.happened(
-      FarmEventKind::worker_joined, hello.worker_id,
-      fmt::format("{} threads on {}, {}", hello.num_threads, hello.host, hello.renderer)));
+  BATON_TRY(
+      farm_.history.happened(FarmEventKind::worker_joined, hello.worker_id, worker_text(hello)));
   return farm_.step(WorkerJoined{hello.worker_id, hello.running, renderer_of(hello)});
 }
 
-/// Whether those that are connected may yet turn out to be silent: not once they have shown
-/// themselves for longer than that takes since this process first asked.
-bool Service::may_be_alone_soon(const WorkerHello& hello) {
-  if (hello.build != build_identity()) return false;
+/// Those that are connected may yet turn out to be silent, and the worker asks again: not once they
+/// have shown themselves for longer than that takes since it first asked.
+Status Service::turn_away(const PeerId& peer, const WorkerHello& hello,
+                          const std::string& difference) {
   const TimePoint now = std::chrono::steady_clock::now();
-  if (unlike_.size() >= limits::kMaxWorkers) unlike_.clear();
-  const TimePoint since = unlike_.try_emplace(hello.instance, now).first->second;
-  if (now - since <= farm_.options.silence_limit()) return true;
-  unlike_.erase(hello.instance);
-  return false;
+  const TimePoint first = farm_.peers.turn_away(hello, difference, now);
+  if (hello.build == build_identity() && now - first <= farm_.options.silence_limit()) {
+    tell("not let in now: " + difference);
+    return farm_.refuse(
+        peer, {ErrorKind::timeout, difference + "; asked again, since that one may be gone"});
+  }
+  tell("refused: " + difference);
+  return farm_.refuse(peer, {ErrorKind::version,
+                             difference + "; pixels may differ: use one build on all machines, or "
+                                          "start the coordinator with --mixed-builds"});
 }
 
 /// Says where pixels of the worker may differ from those of the others; nullopt: nowhere.

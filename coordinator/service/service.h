@@ -46,12 +46,13 @@ class Service {
   Status restore_job(const Digest& job);
   Status clean_up();
   Status turn();
+  Status send_home();
   Status handle(const Incoming& incoming);
 
   // Messages of workers.
   Status receive(const PeerId& peer, const WorkerHello& message);
   std::optional<std::string> other_build(const WorkerHello& hello) const;
-  bool may_be_alone_soon(const WorkerHello& hello);
+  Status turn_away(const PeerId& peer, const WorkerHello& hello, const std::string& difference);
   Status receive_from(const std::string& worker, const LeaseRequest& message);
   Status receive_from(const std::string& worker, const Heartbeat& message);
   Status receive_from(const std::string& worker, const TaskDone& message);
@@ -113,8 +114,6 @@ class Service {
   std::unique_ptr<FarmCore> owned_farm_;
   FarmCore& farm_;
   OncePerPeer complained_, asked_for_hello_;
-  /// When instances of workers that render otherwise than the others first asked to be let in.
-  std::map<std::uint64_t, TimePoint> unlike_;
   Speaker speaker_;                        ///< who sent the message in hand
   std::map<std::string, TimePoint> told_;  ///< warnings, and when
   TimePoint next_tick_{};

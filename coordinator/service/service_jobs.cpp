@@ -198,6 +198,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   if (const Status folder = expect_folder(document->job.output.directory); !folder)
     return farm_.refuse(peer, folder.error());
   BATON_ASSIGN(const JobId id, submission.known_job(*document));
+  drop_stale_locks(document->job, farm_.history.jobs());
   const Status free = expect_no_strange_locks(document->job, farm_.history.jobs(), id);
   if (!free) return farm_.refuse(peer, free.error());
   const LockedFrames locked(document->job, farm_.history.jobs().locked(id));
@@ -319,12 +320,14 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
   if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
-  tell_locks(document->job, farm_.history.jobs(), id, farm_.options.roots);
+  BATON_TRY(
+      tell_locks(farm_.journal, document->job, farm_.history.jobs(), id, farm_.options.roots));
   // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
   // stand now.
   BATON_ASSIGN(const bool ends_again, farm_.ended_by_frames(*job, fault, message.off));
   if (ends_again && fault.empty())
-    BATON_TRY(Submission(farm_, files_, speaker_).submit(PeerId(), *document, {*text, false}, {}));
+    BATON_TRY(
+        Submission(farm_, files_, speaker_).submit(PeerId(), *document, {*text, false, true}, {}));
   return answer_detail(peer, *job);
 }
 
@@ -369,7 +372,8 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   const std::vector<FrameNumber> locked = farm_.history.jobs().locked(id);
   if (document && !locked.empty()) {
     BATON_TRY(farm_.history.locked(*job, locked, false));
-    tell_locks(document->job, farm_.history.jobs(), id, farm_.options.roots);
+    BATON_TRY(
+        tell_locks(farm_.journal, document->job, farm_.history.jobs(), id, farm_.options.roots));
   }
   for (const Digest& version : farm_.history.jobs().versions(id)) {
     BATON_TRY(farm_.archive_job(version));

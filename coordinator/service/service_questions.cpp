@@ -11,6 +11,39 @@
 #include "coordinator/service/service.h"
 
 namespace baton {
+namespace {
+
+/// Attempts that have failed since the job was submitted last, whether it has ended or not, at most
+/// 100 of them.
+Result<std::vector<ListedTask>> failed_tasks(Journal& journal, const JobId& job) {
+  constexpr std::size_t kMost = 100;
+  std::vector<ListedTask> tasks;
+  if (job.empty()) return tasks;
+  BATON_ASSIGN(const std::vector<FarmEvent> events,
+               journal.events({.job = job,
+                               .count = limits::kMaxEventsTold,
+                               .kinds = bit_of(FarmEventKind::task_failed) |
+                                        bit_of(FarmEventKind::job_submitted) |
+                                        bit_of(FarmEventKind::job_changed)}));
+  for (const FarmEvent& event : events) {
+    if (event.kind != FarmEventKind::task_failed) {
+      tasks.clear();
+      continue;
+    }
+    tasks.push_back({.job = job,
+                     .has_task = event.has_task,
+                     .task = event.task,
+                     .worker = event.worker,
+                     .has_failed = true,
+                     .seconds = event.seconds,
+                     .time_ms = event.time_ms,
+                     .message = event.reason});
+  }
+  if (tasks.size() > kMost) tasks.erase(tasks.begin(), tasks.end() - kMost);
+  return tasks;
+}
+
+}  // namespace
 
 Status Service::receive(const PeerId& peer, const ListJobs& message) {
   const IdentityBook& known = farm_.history.jobs();
@@ -94,7 +127,6 @@ Status Service::receive(const PeerId& peer, const AskWhy& message) {
 }
 
 Status Service::receive(const PeerId& peer, const ListTasks& message) {
-  constexpr int kMostFailures = 100;
   std::vector<Digest> jobs = farm_.scheduler.jobs();
   if (!message.job.empty()) {
     const Result<Digest> job = resolve(message.job);
@@ -105,9 +137,9 @@ Status Service::receive(const PeerId& peer, const ListTasks& message) {
   TaskList list;
   for (const Digest& job : jobs) {
     for (ListedTask& task : answers.tasks_in_hand(job)) list.tasks.push_back(std::move(task));
-    BATON_ASSIGN(const std::vector<Failure> failures,
-                 farm_.journal.recent_failures(job, kMostFailures));
-    for (const Failure& failure : failures) list.tasks.push_back(answers.failed_task(job, failure));
+    BATON_ASSIGN(std::vector<ListedTask> failed,
+                 failed_tasks(farm_.journal, farm_.history.jobs().of(job).id));
+    for (ListedTask& task : failed) list.tasks.push_back(std::move(task));
   }
   return farm_.reply(peer, std::move(list));
 }

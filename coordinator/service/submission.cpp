@@ -1,6 +1,7 @@
 #include "coordinator/service/submission.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -92,7 +93,7 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
     Neighbour other =
         look_at(former, digest, document, files_, ended ? &ended->frames_done : nullptr, locks);
     if (!other.locked.empty())
-      return locked_elsewhere(document.job, other, farm_.history.name_of(digest));
+      return locked_elsewhere(document.job, other.locked, farm_.history.name_of(digest));
     if (other.busy && !restart && !is_former_version) {
       return Error{
           ErrorKind::bad_input,
@@ -122,7 +123,14 @@ Result<std::vector<std::string>> Submission::make_way(const ParsedJobDocument& d
     const std::string other_name = farm_.history.name_of(other.job);
     if (is_open(other.status)) {
       if (other_name != name) spdlog::info("job {} makes way for job {}", other_name, name);
-      BATON_TRY(farm_.step(JobSuperseded{other.job, {}}));
+      const IdentityBook& known = farm_.history.jobs();
+      BATON_TRY(farm_.step(JobSuperseded{
+          other.job,
+          {},
+          other_name == name
+              ? fmt::format("version {} goes on in place of version {}",
+                            known.of(document.digest).version, known.of(other.job).version)
+              : fmt::format("job {} writes its frames from now on", name)}));
       BATON_TRY(farm_.archive_job(other.job));
       if (!other.left_out.empty())
         reasons.push_back(
@@ -170,11 +178,13 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
   const bool begins_again = known != nullptr && message.restart &&
                             farm_.scheduler.leases().nobody_renders_as(known->renderer);
   if (begins_again) {
-    BATON_TRY(farm_.step(JobSuperseded{document.digest, {}}));
+    BATON_TRY(farm_.step(JobSuperseded{
+        document.digest, {}, "it begins again, as nobody renders as it was rendered"}));
     BATON_TRY(farm_.archive_job(document.digest));
   } else if (known != nullptr) {
     if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
     BATON_TRY(begin_growth(document, message.restart));
+    if (!message.keep_priority) BATON_TRY(take_priority(document));
     return go_on(peer, document.digest, message.restart);
   }
 
@@ -191,13 +201,49 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return others.error();
     return farm_.refuse(peer, others.error());
   }
-  BATON_TRY(farm_.history.submitted(document.digest, id, message.restart ? "restart" : ""));
+  std::string changes = changes_text(document, id, message.keep_priority);
+  if (message.restart) changes = changes.empty() ? "restart" : "restart; " + changes;
+  BATON_TRY(farm_.history.submitted(document.digest, id, changes));
+  if (!message.keep_priority)
+    BATON_TRY(farm_.history.forget_priority(document.digest, document.job.priority));
   if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
   const std::set<std::string> files = frame_files(document.job, document.job.frames);
   BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return !files.contains(file); }));
   BATON_TRY(begin_growth(document, message.restart));
   BATON_ASSIGN(std::vector<std::string> reasons, make_way(document, *others));
   return begin(peer, document, message, std::move(reasons));
+}
+
+/// What the document makes another of a job that is known; empty: nothing of its place in the queue
+/// and of its frames.
+std::string Submission::changes_text(const ParsedJobDocument& document, const JobId& job,
+                                     bool keep_priority) {
+  const std::vector<Digest> versions = farm_.history.jobs().versions(job);
+  if (versions.empty()) return {};
+  const Result<std::optional<std::string>> text = farm_.journal.document(versions.back());
+  const auto before = parse_farm_document(text && *text ? **text : std::string());
+  if (!before) return {};
+  std::vector<std::string> changes;
+  const auto compare = [&](const char* what, auto is, auto was) {
+    if (is != was) changes.push_back(fmt::format("{} {}, it was {}", what, is, was));
+  };
+  const IdentityBook& known = farm_.history.jobs();
+  const std::int32_t written = document.job.priority;
+  compare("frames", format_frames(document.job.frames), format_frames(before->job.frames));
+  compare("priority", keep_priority ? known.priority(job, written) : written,
+          known.priority(job, before->job.priority));
+  return fmt::format("{}", fmt::join(changes, "; "));
+}
+
+/// The document of an open job is submitted again, and its priority holds again.
+Status Submission::take_priority(const ParsedJobDocument& document) {
+  const std::int32_t before = farm_.scheduler.find_job(document.digest)->spec.priority;
+  const std::int32_t written = document.job.priority;
+  BATON_TRY(farm_.history.forget_priority(document.digest, written));
+  if (before == written) return {};
+  BATON_TRY(farm_.history.prioritized(document.digest, before, {written, written},
+                                      ": its file was submitted again"));
+  return farm_.step(PriorityChanged{document.digest, written});
 }
 
 /// Starts a job with all that former ones of its picture leave to it.
@@ -208,7 +254,8 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
   BATON_ASSIGN(const Heritage heritage, find_heritage(document, message.restart, locked, reasons));
 
   JobAdded event{digest, document.job, JobStatus::running, {}, {}};
-  BATON_ASSIGN(event.spec.priority, farm_.history.priority_of(digest, document.job.priority));
+  event.spec.priority =
+      farm_.history.jobs().priority(farm_.history.jobs().of(digest).id, document.job.priority);
   BATON_ASSIGN(const std::optional<std::string> known, farm_.journal.document(digest));
   BATON_TRY(take_over(heritage, known ? "" : message.json, event));
   LostFiles lost = find_lost_files(event, farm_.store, files_, locked);

@@ -59,6 +59,8 @@ class Submission {
   };
   Result<WrittenSweeps> written_sweeps(const ParsedJobDocument& document);
   Result<bool> grow(const Digest& version);
+  std::string changes_text(const ParsedJobDocument& document, const JobId& job, bool keep_priority);
+  Status take_priority(const ParsedJobDocument& document);
   Status begin_growth(const ParsedJobDocument& document, bool restart);
   Status add_sweeps(const Digest& version, int sweeps, const std::string& reason);
   Status disown(const Digest& job, const std::vector<FrameNumber>& frames, const std::string& by);

@@ -130,7 +130,7 @@ Status Submission::add_sweeps(const Digest& version, int sweeps, const std::stri
   BATON_ASSIGN(const std::vector<Neighbour> others, find_neighbours(document, id, false));
   BATON_TRY(farm_.history.submitted(document.digest, id, reason));
   BATON_ASSIGN(std::vector<std::string> reasons, make_way(document, others));
-  return begin({}, document, SubmitJob{text, false}, std::move(reasons));
+  return begin({}, document, SubmitJob{text, false, /*keep_priority=*/true}, std::move(reasons));
 }
 
 }  // namespace baton

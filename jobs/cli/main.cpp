@@ -7,6 +7,7 @@
 
 #include "common/base/build.h"
 #include "common/base/log.h"
+#include "common/base/option_values.h"
 #include "common/base/suggest.h"
 #include "jobs/cli/commands.h"
 
@@ -96,6 +97,10 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(kFooter);
 
+  app.parse_complete_callback([&app] {
+    if (const std::string fault = baton::value_fault(app); !fault.empty())
+      throw CLI::ValidationError(fault);
+  });
   auto code = baton::ExitCode::ok;
   baton::add_check_command(app, code);
   baton::add_render_command(app, code);

@@ -43,7 +43,12 @@ Result<std::int64_t> parse_since(const std::string& text, std::int64_t now) {
   for (const char* const form : {"%Y-%m-%dT%H:%M:%SZ", "%Y-%m-%dT%H:%M:%S", "%Y-%m-%d"}) {
     std::tm time{};
     const char* const rest = ::strptime(text.c_str(), form, &time);
-    if (rest != nullptr && *rest == '\0') return std::int64_t{1000} * ::timegm(&time);
+    if (rest == nullptr || *rest != '\0') continue;
+    // There is no 30th of February: it would become another day.
+    const std::tm said = time;
+    const std::time_t seconds = ::timegm(&time);
+    if (time.tm_mday == said.tm_mday && time.tm_mon == said.tm_mon && time.tm_min == said.tm_min)
+      return std::int64_t{1000} * seconds;
   }
   return Error{ErrorKind::usage,
                fmt::format("--since {}: expected 30s, 15m, 2h or 3d, or a time in UTC as "

@@ -114,7 +114,7 @@ Status write_record(const std::filesystem::path& path, const RunRecord& record) 
     visit_frame(frame, Write{item});
     root["frames"].push_back(std::move(item));
   }
-  const std::string text = root.dump(1);
+  const std::string text = root.dump(1, ' ', false, json::error_handler_t::replace);
   return write_file_unsynced(path, as_bytes_view(text));
 }
 

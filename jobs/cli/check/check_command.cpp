@@ -20,6 +20,7 @@
 #include "jobs/cli/check/surface_share.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/job_argument.h"
+#include "jobs/cli/json_text.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
 
@@ -108,7 +109,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                        {"cpuSeconds", plan.cpu_seconds}};
   }
   if (!settings.empty()) result["settings"] = settings_json(settings);
-  fmt::print("{}\n", result.dump(2));
+  fmt::print("{}\n", json_text(result, 2));
 }
 
 /// Whether two maps are alike and are called alike but for digits.

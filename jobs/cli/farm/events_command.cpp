@@ -9,6 +9,7 @@
 #include "common/base/utc.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/json_text.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -55,7 +56,7 @@ std::string event_line(const FarmEvent& event) {
 
 void print_events(const std::vector<FarmEvent>& events, bool json) {
   for (const FarmEvent& event : events)
-    fmt::print("{}\n", json ? event_json(event).dump() : event_line(event));
+    fmt::print("{}\n", json ? json_text(event_json(event)) : event_line(event));
   std::fflush(stdout);
 }
 
@@ -63,10 +64,10 @@ void print_events(const std::vector<FarmEvent>& events, bool json) {
 void print_forgotten(const std::vector<ForgottenEvents>& forgotten, bool json) {
   for (const ForgottenEvents& sum : forgotten) {
     if (json) {
-      fmt::print("{}\n", ordered_json{{"kind", farm_event_name(sum.kind)},
-                                      {"forgotten", sum.count},
-                                      {"seconds", sum.seconds}}
-                             .dump());
+      fmt::print("{}\n", json_text({{"kind", farm_event_name(sum.kind)},
+                                    {"forgotten", sum.count},
+                                    {"seconds", sum.seconds}}));
+      ;
     } else {
       fmt::print("before              {:<19}  {} times{}\n", farm_event_name(sum.kind), sum.count,
                  sum.seconds > 0 ? fmt::format(", {:.1f} s together", sum.seconds) : "");
@@ -76,11 +77,11 @@ void print_forgotten(const std::vector<ForgottenEvents>& forgotten, bool json) {
 
 /// What has happened, and with --follow what happens until the coordinator ends.
 Result<ExitCode> show_events(const EventsOptions& options) {
-  BATON_ASSIGN(RequestClient client, options.link.connect());
   ListEvents question{options.job, {.count = options.count}};
   if (!options.since.empty()) {
     BATON_ASSIGN(question.query.since_ms, parse_since(options.since, now_ms()));
   }
+  BATON_ASSIGN(RequestClient client, options.link.connect());
   BATON_ASSIGN(EventList found, ask<EventList>(client, question));
   print_forgotten(found.forgotten, options.json);
   print_events(found.events, options.json);

@@ -10,6 +10,7 @@
 #include "jobs/cli/farm/slurm_farm.h"
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/json_text.h"
 
 namespace baton {
 namespace {
@@ -70,7 +71,8 @@ void print_status(const JobList& list, const Crews& crews) {
     fmt::print("pilot {:<10} {:<10} {:<10} {:>10}       {}\n", id, "", "not in the queue", "",
                worker_lines(worker));
   for (const WorkerSummary& worker : crews.others) fmt::print("{}\n", worker_lines(worker));
-  fmt::print("{} pilots, {} workers\n", crews.pilots.size(), list.workers.size());
+  fmt::print("{} pilots, {} workers{}\n", crews.pilots.size(), list.workers.size(),
+             absent_counts(list));
 }
 
 ordered_json status_json(const JobList& list, const Crews& crews) {
@@ -79,12 +81,12 @@ ordered_json status_json(const JobList& list, const Crews& crews) {
       {"jobsEnded", list.num_ended},
       {"tasksReady", list.tasks_ready},
       {"workers", ordered_json::array()},
-      {"lost", ordered_json::array()},
+      {"turnedAway", absent_json(list.turned_away)},
+      {"lost", absent_json(list.lost)},
       {"pilots", ordered_json::array()},
       {"slurm", crews.silence.empty() ? ordered_json() : ordered_json(crews.silence)}};
   for (const ListedJob& job : list.jobs) result["jobs"].push_back(summary_json(job));
   for (const WorkerSummary& worker : list.workers) result["workers"].push_back(worker_json(worker));
-  for (const LostWorker& worker : list.lost) result["lost"].push_back(lost_json(worker));
   for (const auto& [pilot, workers] : crews.pilots) {
     ordered_json row = {{"id", pilot.id},
                         {"name", pilot.job_name},
@@ -104,7 +106,7 @@ Result<ExitCode> show_status(const StatusOptions& options) {
   BATON_ASSIGN(const JobList list, ask<JobList>(client, ListJobs{}));
   const Crews crews = find_crews(list.workers);
   if (options.json) {
-    fmt::print("{}\n", status_json(list, crews).dump(2));
+    fmt::print("{}\n", json_text(status_json(list, crews), 2));
   } else {
     print_status(list, crews);
   }
@@ -133,10 +135,10 @@ Result<ExitCode> stop(const StatusOptions& options) {
   }
   BATON_TRY(ask<Shutdown>(client, StopCoordinator{}));
   if (options.json) {
-    fmt::print("{}\n", ordered_json{{"stopped", options.link.endpoint},
-                                    {"workers", list.workers.size()},
-                                    {"openJobs", list.jobs.size()}}
-                           .dump(2));
+    fmt::print("{}\n", json_text({{"stopped", options.link.endpoint},
+                                  {"workers", list.workers.size()},
+                                  {"openJobs", list.jobs.size()}},
+                                 2));
     return ExitCode::ok;
   }
   fmt::print(

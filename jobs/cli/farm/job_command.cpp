@@ -18,6 +18,7 @@
 #include "jobs/cli/farm/job_questions.h"
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/json_text.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -46,11 +47,12 @@ struct JobOptions {
 /// What became of a job that was handed in.
 void print_accepted(const JobAccepted& accepted, bool json) {
   if (json)
-    return fmt::print("{}\n", ordered_json{{"id", accepted.identity.id.hex()},
-                                           {"version", accepted.identity.version},
-                                           {"alreadyThere", accepted.already_there},
-                                           {"plan", accepted.plan}}
-                                  .dump(2));
+    return fmt::print("{}\n", json_text({{"id", accepted.identity.id.hex()},
+                                         {"version", accepted.identity.version},
+                                         {"alreadyThere", accepted.already_there},
+                                         {"plan", accepted.plan}},
+                                        2));
+  ;
   fmt::print("{}\n", accepted.identity.id.hex());
   if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
   fmt::print(stderr, "{}", accepted.plan);
@@ -80,7 +82,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
 
 void print_detail(const ShownJob& job, bool json) {
   const JobDetail& detail = job.detail;
-  if (json) return fmt::print("{}\n", detail_json(job).dump(2));
+  if (json) return fmt::print("{}\n", json_text(detail_json(job), 2));
   fmt::print("{}\n", job_line({job.identity, detail.summary, job.now}));
   fmt::print("output     {}\n", detail.summary.output_directory);
   if (!detail.summary.owner.empty()) fmt::print("owner      {}\n", detail.summary.owner);
@@ -181,7 +183,8 @@ Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(JobDocument document,
                ask<JobDocument>(client, JobDocumentRequest{before.detail.summary.version}));
   BATON_ASSIGN(const JobAccepted accepted,
-               ask_until_done<JobAccepted>(client, SubmitJob{std::move(document.json)}));
+               ask_until_done<JobAccepted>(
+                   client, SubmitJob{std::move(document.json), false, /*keep_priority=*/true}));
   fmt::print(stderr, "{}", accepted.plan);
   BATON_ASSIGN(const ShownJob after, ask<ShownJob>(client, ShowJob{before.identity.id.hex()}));
   print_change(before, after, options.json);
@@ -211,7 +214,8 @@ Result<ExitCode> refine(const JobOptions& options, RequestClient& client) {
   quality.refinable = true;
   BATON_ASSIGN(std::string wanted, make_job_document(parsed.job));
   BATON_ASSIGN(const JobAccepted accepted,
-               ask_until_done<JobAccepted>(client, SubmitJob{std::move(wanted)}));
+               ask_until_done<JobAccepted>(
+                   client, SubmitJob{std::move(wanted), false, /*keep_priority=*/true}));
   print_accepted(accepted, options.json);
   return ExitCode::ok;
 }
@@ -237,7 +241,7 @@ Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
   }
   const std::size_t num_deleted = jobs.size() - num_others;
   if (options.json) {
-    fmt::print("{}\n", ordered_json{{"deleted", num_deleted}, {"others", num_others}}.dump(2));
+    fmt::print("{}\n", json_text({{"deleted", num_deleted}, {"others", num_others}}, 2));
     return ExitCode::ok;
   }
   fmt::print("{} jobs are deleted; their frames stay\n", num_deleted);

@@ -10,6 +10,7 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/json_text.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -51,11 +52,8 @@ std::vector<std::string> activities() {
 }
 
 /// Which of the jobs are wanted, in which order.
-Result<std::vector<ListedJob>> chosen(const ListOptions& options, std::vector<ListedJob> jobs) {
-  std::int64_t since_ms = 0;
-  if (!options.since.empty()) {
-    BATON_ASSIGN(since_ms, parse_since(options.since, now_ms()));
-  }
+std::vector<ListedJob> chosen(const ListOptions& options, std::int64_t since_ms,
+                              std::vector<ListedJob> jobs) {
   std::erase_if(jobs, [&](const ListedJob& job) {
     return (!options.owner.empty() && job.summary.owner != options.owner) ||
            (!options.activity.empty() && job_activity_name(job.now.activity) != options.activity) ||
@@ -66,12 +64,16 @@ Result<std::vector<ListedJob>> chosen(const ListOptions& options, std::vector<Li
 }
 
 Result<ExitCode> list(const ListOptions& options) {
+  std::int64_t since_ms = 0;
+  if (!options.since.empty()) {
+    BATON_ASSIGN(since_ms, parse_since(options.since, now_ms()));
+  }
   BATON_ASSIGN(RequestClient client, options.link.connect());
   const bool asks_for_ended =
       options.activity == "done" || options.activity == "failed" || options.activity == "cancelled";
   const bool all = options.all || asks_for_ended;
   BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{all}));
-  BATON_ASSIGN(const std::vector<ListedJob> jobs, chosen(options, found.jobs));
+  const std::vector<ListedJob> jobs = chosen(options, since_ms, found.jobs);
   if (!options.json) {
     for (const ListedJob& job : jobs)
       fmt::print("{}\n", options.is_long ? long_job_line(job) : job_line(job));
@@ -85,7 +87,7 @@ Result<ExitCode> list(const ListOptions& options) {
   for (const ListedJob& job : jobs) result["jobs"].push_back(summary_json(job));
   for (const WorkerSummary& worker : found.workers)
     result["workers"].push_back(worker_json(worker));
-  fmt::print("{}\n", result.dump(2));
+  fmt::print("{}\n", json_text(result, 2));
   return ExitCode::ok;
 }
 

@@ -10,6 +10,8 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/json_text.h"
+#include "jobs/cli/text.h"
 
 namespace baton {
 namespace {
@@ -33,11 +35,13 @@ Result<ExitCode> why(const WhyOptions& options) {
   if (options.json) {
     ordered_json rows = ordered_json::array();
     for (const Reason& reason : chain.reasons) rows.push_back(reason_json(reason));
-    fmt::print("{}\n", rows.dump(2));
+    fmt::print("{}\n", json_text(rows, 2));
     return ExitCode::ok;
   }
   bool follows = false;
   for (const Reason& reason : chain.reasons) {
+    // Whoever has a task may say nothing any more.
+    follows = follows || (reason.kind == ReasonKind::silent && &reason != &chain.reasons.front());
     fmt::print("{}{}\n", follows ? "  <- " : "", reason_line(reason));
     follows = !is_last(reason.kind);
   }
@@ -60,8 +64,8 @@ bool is_slow(const ListedTask& task) {
 std::string task_line(const ListedTask& task) {
   const std::string place = task.has_task ? place_text(task.task) : "a task of an earlier version";
   if (task.has_failed)
-    return fmt::format("job {}  failed     {}  on {}: {}", task.job.short_hex(), place, task.worker,
-                       task.message);
+    return fmt::format("job {}  failed     {}, attempt {}  on {}, {}: {}", task.job.short_hex(),
+                       place, task.task.attempt, task.worker, utc_text(task.time_ms), task.message);
   return fmt::format("job {}  {:<9}  {}, attempt {}  on {} for {}{}", task.job.short_hex(),
                      is_slow(task) ? "slow" : "running", place, task.task.attempt, task.worker,
                      task_time_text(task.seconds), usual_text(task.usual));
@@ -74,6 +78,8 @@ ordered_json task_json(const ListedTask& task) {
                       {"worker", task.worker}};
   if (task.has_task) row.update(place_json(task.task));
   if (task.has_failed) {
+    row["failed"] = utc_json(task.time_ms);
+    row["seconds"] = task.seconds;
     row["message"] = task.message;
   } else {
     row["seconds"] = task.seconds;
@@ -94,11 +100,12 @@ Result<ExitCode> show_tasks(const TasksOptions& options) {
   if (options.json) {
     ordered_json rows = ordered_json::array();
     for (const ListedTask& task : found.tasks) rows.push_back(task_json(task));
-    fmt::print("{}\n", rows.dump(2));
+    fmt::print("{}\n", json_text(rows, 2));
     return ExitCode::ok;
   }
   for (const ListedTask& task : found.tasks) fmt::print("{}\n", task_line(task));
-  fmt::print("{} tasks\n", found.tasks.size());
+  fmt::print("{} tasks{}\n", found.tasks.size(),
+             options.job.empty() ? " of jobs that have not ended" : "");
   return ExitCode::ok;
 }
 
@@ -131,7 +138,7 @@ Result<ExitCode> set(const SetOptions& options) {
   BATON_ASSIGN(RequestClient client, options.link.connect());
   BATON_ASSIGN(const ShownJob job, ask<ShownJob>(client, SetPriority{options.job, priority}));
   if (options.json) {
-    fmt::print("{}\n", detail_json(job).dump(2));
+    fmt::print("{}\n", json_text(detail_json(job), 2));
   } else {
     fmt::print("{}\n", long_job_line({job.identity, job.detail.summary, job.now}));
   }

@@ -11,6 +11,7 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/json_text.h"
 #include "jobs/cli/signals.h"
 #include "jobs/cli/text.h"
 
@@ -55,9 +56,8 @@ std::vector<std::string> screen_lines(const CoordinatorLink& link, JobList list)
   }
   std::vector<std::string> lines;
   lines.push_back(fmt::format("{}  {}", link.endpoint, utc_text(now_ms())));
-  lines.push_back(fmt::format("{} jobs{}; {} tasks are ready; {} workers, {} lost in a day",
-                              list.jobs.size(), summary, list.tasks_ready, list.workers.size(),
-                              list.lost.size()));
+  lines.push_back(fmt::format("{} jobs{}; {} tasks are ready; {} workers{}", list.jobs.size(),
+                              summary, list.tasks_ready, list.workers.size(), absent_counts(list)));
   lines.emplace_back();
   std::ranges::stable_sort(list.jobs, [](const ListedJob& a, const ListedJob& b) {
     return a.summary.priority > b.summary.priority;
@@ -97,11 +97,11 @@ std::string screen_json(const JobList& list) {
                          {"tasksReady", list.tasks_ready},
                          {"jobs", ordered_json::array()},
                          {"workers", ordered_json::array()},
-                         {"lost", ordered_json::array()}};
+                         {"turnedAway", absent_json(list.turned_away)},
+                         {"lost", absent_json(list.lost)}};
   for (const ListedJob& job : list.jobs) result["jobs"].push_back(summary_json(job));
   for (const WorkerSummary& worker : list.workers) result["workers"].push_back(worker_json(worker));
-  for (const LostWorker& worker : list.lost) result["lost"].push_back(lost_json(worker));
-  return result.dump();
+  return json_text(result);
 }
 
 /// Until Ctrl-C, or so many screens; where there is no terminal, one.

@@ -4,6 +4,7 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/job_questions.h"
 #include "jobs/cli/farm/worker_text.h"
+#include "jobs/cli/json_text.h"
 
 namespace baton {
 namespace {
@@ -20,13 +21,16 @@ void print_workers(const JobList& found, bool json) {
   if (json) {
     ordered_json list = ordered_json::array();
     for (const WorkerSummary& worker : found.workers) list.push_back(worker_json(worker));
-    for (const LostWorker& worker : found.lost) list.push_back(lost_json(worker));
-    return fmt::print("{}\n", list.dump(2));
+    for (const auto* const absent : {&found.turned_away, &found.lost}) {
+      for (const AbsentWorker& worker : *absent) list.push_back(absent_json(worker));
+    }
+    return fmt::print("{}\n", json_text(list, 2));
   }
   for (const WorkerSummary& worker : found.workers) fmt::print("{}\n", worker_lines(worker));
-  for (const LostWorker& worker : found.lost) fmt::print("{}\n", lost_line(worker));
-  fmt::print("{} workers{}\n", found.workers.size(),
-             found.lost.empty() ? "" : fmt::format(", {} lost in a day", found.lost.size()));
+  for (const auto* const absent : {&found.turned_away, &found.lost}) {
+    for (const AbsentWorker& worker : *absent) fmt::print("{}\n", absent_line(worker));
+  }
+  fmt::print("{} workers{}\n", found.workers.size(), absent_counts(found));
 }
 
 /// question: ListJobs or DrainWorker.
@@ -59,7 +63,8 @@ void add_worker_command(CLI::App& app, ExitCode& code) {
     return std::pair(command, options.get());
   };
   add_worker_questions(*worker, code);
-  add("list", "Connected workers: what each does, for how long; those that were lost in a day",
+  add("list",
+      "Connected workers: what each does, for how long; those turned away, or lost, in a day",
       [](const WorkerCommandOptions&) { return ListJobs{}; });
   const auto [drain, drained] =
       add("drain", "Lets a worker finish what it renders, then end; its other tasks go to others",

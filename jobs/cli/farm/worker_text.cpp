@@ -63,21 +63,39 @@ ordered_json worker_json(const WorkerSummary& worker) {
           {"blindTo", std::move(blind)}};
 }
 
-std::string lost_line(const LostWorker& worker) {
-  return fmt::format(
-      "{:<24}  lost       {}, after {}  {}", worker.worker_id, utc_text(worker.lost_ms),
-      worker.joined_ms == 0
-          ? std::string("-")
-          : duration_text(static_cast<double>(worker.lost_ms - worker.joined_ms) / 1000),
-      worker.about);
+std::string absent_line(const AbsentWorker& worker) {
+  const bool is_lost = worker.absence == Absence::lost;
+  std::string text = fmt::format("{:<24}  {:<11}  {}", worker.worker_id,
+                                 absence_name(worker.absence), utc_text(worker.since_ms));
+  if (worker.joined_ms > 0)
+    text +=
+        fmt::format(", after {}",
+                    duration_text(static_cast<double>(worker.since_ms - worker.joined_ms) / 1000));
+  text += "  " + worker.about;
+  return is_lost || worker.reason.empty() ? text : text + "\n  " + worker.reason;
 }
 
-ordered_json lost_json(const LostWorker& worker) {
-  return {{"id", worker.worker_id},
-          {"activity", "lost"},
-          {"joined", utc_json(worker.joined_ms)},
-          {"lost", utc_json(worker.lost_ms)},
-          {"about", worker.about}};
+ordered_json absent_json(const AbsentWorker& worker) {
+  const bool is_lost = worker.absence == Absence::lost;
+  ordered_json row = {{"id", worker.worker_id}, {"activity", absence_name(worker.absence)}};
+  if (is_lost) row["joined"] = utc_json(worker.joined_ms);
+  row[is_lost ? "lost" : "asked"] = utc_json(worker.since_ms);
+  row["about"] = worker.about;
+  if (!worker.reason.empty()) row["reason"] = worker.reason;
+  return row;
+}
+
+ordered_json absent_json(const std::vector<AbsentWorker>& workers) {
+  ordered_json rows = ordered_json::array();
+  for (const AbsentWorker& worker : workers) rows.push_back(absent_json(worker));
+  return rows;
+}
+
+std::string absent_counts(const JobList& list) {
+  std::string text;
+  if (!list.turned_away.empty()) text += fmt::format(", {} turned away", list.turned_away.size());
+  if (!list.lost.empty()) text += fmt::format(", {} lost in a day", list.lost.size());
+  return text;
 }
 
 std::string reason_line(const Reason& reason) {

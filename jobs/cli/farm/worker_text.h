@@ -11,9 +11,12 @@ namespace baton {
 /// not see.
 std::string worker_lines(const WorkerSummary& worker);
 nlohmann::ordered_json worker_json(const WorkerSummary& worker);
-/// The line of a worker that was lost.
-std::string lost_line(const LostWorker& worker);
-nlohmann::ordered_json lost_json(const LostWorker& worker);
+/// The line of a worker that was lost, or turned away.
+std::string absent_line(const AbsentWorker& worker);
+nlohmann::ordered_json absent_json(const AbsentWorker& worker);
+nlohmann::ordered_json absent_json(const std::vector<AbsentWorker>& workers);
+/// ", 1 turned away, 2 lost in a day"; empty: none.
+std::string absent_counts(const JobList& list);
 
 /// "0.3s", "41s", "3m05s".
 std::string task_time_text(double seconds);

@@ -9,6 +9,7 @@
 #include "common/state/sample_planes.h"
 #include "common/state/source_names.h"
 #include "jobs/cli/commands.h"
+#include "jobs/cli/json_text.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -169,7 +170,7 @@ Result<ExitCode> show(const StateOptions& options) {
   if (options.json) {
     ordered_json result = report_json(report);
     if (pixel) result["pixel"] = *pixel;
-    fmt::print("{}\n", result.dump(2));
+    fmt::print("{}\n", json_text(result, 2));
   } else {
     print_report(report);
     if (pixel) print_pixel(*pixel);

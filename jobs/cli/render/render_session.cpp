@@ -11,6 +11,7 @@
 #include "common/job/plan/sequence.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/json_text.h"
 #include "jobs/cli/render/progress.h"
 #include "jobs/cli/text.h"
 
@@ -154,7 +155,7 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
   if (!shown) return std::optional<JobStatus>();
   const JobStatus status = shown->detail.summary.status;
   if (options_.json) {
-    fmt::print("{}\n", detail_json(*shown).dump(2));
+    fmt::print("{}\n", json_text(detail_json(*shown), 2));
   } else {
     print_result(job, shown->detail, std::chrono::duration<double>(Clock::now() - start).count());
   }

@@ -23,7 +23,7 @@ struct ReasonsFarm : Farm {
     submit();
   }
   std::vector<Cause> why(std::set<std::string> draining = {}) const {
-    return Reasons(scheduler, now, std::move(draining)).of_job(job);
+    return Reasons(scheduler, now, {std::move(draining)}).of_job(job);
   }
   std::vector<Cause> why_task(const TaskKey& key) const {
     return Reasons(scheduler, now).of_task(job, *scheduler.find_job(job)->tasks.graph().find(key));
@@ -49,6 +49,40 @@ TEST(Reasons, AFrameWaitsForATileThatWaitsForAStateThatAWorkerMakes) {
   EXPECT_EQ(chain[2].task, in_hand.lease.task);
   EXPECT_THAT(chain[2].workers, ElementsAre("node3"));
   EXPECT_EQ(farm.now - *chain[2].since, 41s);
+}
+
+TEST(Reasons, WhoSaysNothingIsTheCause) {
+  ReasonsFarm farm(small_job(1, 2, 1));
+  farm.step(WorkerJoined{"a", {}});
+  const TaskKey task = farm.ask_one("a").lease.task;
+  const TaskIndex index = *farm.scheduler.find_job(farm.job)->tasks.graph().find(task);
+  const auto why = [&](std::chrono::seconds after) {
+    const Reasons reasons(farm.scheduler, farm.now + after, {.silent_after = 2s});
+    EXPECT_EQ(kinds(reasons.of_worker("a")), kinds(reasons.of_task(farm.job, index)));
+    return reasons.of_worker("a");
+  };
+  EXPECT_THAT(kinds(why(1s)), ElementsAre(ReasonKind::running));
+  const std::vector<Cause> chain = why(3s);
+  ASSERT_THAT(kinds(chain), ElementsAre(ReasonKind::running, ReasonKind::silent));
+  EXPECT_THAT(chain[1].workers, ElementsAre("a"));
+  EXPECT_EQ(*chain[1].since, farm.now);
+}
+
+TEST(Reasons, ASilentIdleWorkerIsNotFree) {
+  ReasonsFarm farm(small_job(1, 2, 1));
+  farm.step(WorkerJoined{"a", {}});
+  const Reasons reasons(farm.scheduler, farm.now + 3s, {.silent_after = 2s});
+  EXPECT_THAT(kinds(reasons.of_job(farm.job)), ElementsAre(ReasonKind::input, ReasonKind::silent));
+  EXPECT_THAT(kinds(reasons.of_worker("a")), ElementsAre(ReasonKind::silent));
+}
+
+TEST(Reasons, AnIdleWorkerNamesThePausedJobs) {
+  ReasonsFarm farm(small_job(1, 2, 1));
+  farm.step(WorkerJoined{"a", {}});
+  farm.step(JobPaused{farm.job});
+  const std::vector<Cause> chain = farm.why_worker("a");
+  ASSERT_THAT(kinds(chain), ElementsAre(ReasonKind::no_job));
+  EXPECT_THAT(chain[0].jobs, ElementsAre(farm.job));
 }
 
 TEST(Reasons, NobodyIsConnected) {

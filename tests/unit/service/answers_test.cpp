@@ -130,7 +130,7 @@ TEST_F(AnswersTest, WorkersSayWhatTheyDoAndTheLostAreListed) {
   EXPECT_THAT(ask<JobList>(again.endpoint(), ListJobs{}).lost, IsEmpty()) << "it is here";
 }
 
-TEST_F(AnswersTest, APriorityIsSetWithoutANewVersionAndStays) {
+TEST_F(AnswersTest, APriorityIsSetWithoutANewVersionUntilAFileIsSubmitted) {
   JobId id;
   const auto priority = [&](const std::string& endpoint) {
     return ask<ShownJob>(endpoint, ShowJob{id.hex()}).detail.summary.priority;
@@ -148,12 +148,17 @@ TEST_F(AnswersTest, APriorityIsSetWithoutANewVersionAndStays) {
   }
   const RunningService service(options);
   EXPECT_EQ(priority(service.endpoint()), 90) << "after a restart";
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document, false, /*keep_priority=*/true});
+  EXPECT_EQ(priority(service.endpoint()), 90) << "no file was submitted";
   submit(service.endpoint(), job);
-  EXPECT_EQ(priority(service.endpoint()), 90) << "the same document again";
+  EXPECT_EQ(priority(service.endpoint()), 50) << "the same document again";
+  ask<ShownJob>(service.endpoint(), SetPriority{id.hex(), 90});
   JobSpec longer = job;
   longer.frames.emplace_back(5);
   submit(service.endpoint(), longer);
-  EXPECT_EQ(priority(service.endpoint()), 90) << "a version that says nothing new of it";
+  EXPECT_EQ(priority(service.endpoint()), 50) << "a longer job";
+  EXPECT_EQ(ask<EventList>(service.endpoint(), ListEvents{id.hex(), {}}).events.back().reason,
+            "frames 1-5, it was 1-4; priority 50, it was 90");
   longer.priority = 20;
   submit(service.endpoint(), longer);
   EXPECT_EQ(priority(service.endpoint()), 20) << "what was written last counts";
@@ -182,6 +187,46 @@ TEST(RecentPast, UsualIsTheMedianOfTheLastTasks) {
   EXPECT_EQ(past.usual({8}, TaskKind::render).count, 0);
   past.add({.kind = FarmEventKind::job_deleted, .job = {7}});
   EXPECT_EQ(past.usual({7}, TaskKind::render).count, 0);
+}
+
+TEST_F(AnswersTest, WhateverAWorkerIsCalledItIsShown) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job, "bad\xff\n\x1b[31m");
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  const std::string shown = "bad\ufffd\\n\\x1b[31m";
+  const auto list = ask<JobList>(service.endpoint(), ListJobs{});
+  ASSERT_THAT(list.workers, SizeIs(1));
+  EXPECT_EQ(list.workers[0].worker_id, shown);
+  EXPECT_EQ(ask<EventList>(service.endpoint(), ListEvents{}).events.back().worker, shown);
+  EXPECT_EQ(why(service.endpoint(), {"", shown}).at(0).kind, ReasonKind::no_job);
+  EXPECT_EQ(why(service.endpoint(), {"", "bad\xff\n\x1b[31m"}).at(0).kind, ReasonKind::no_job)
+      << "as it was given";
+}
+
+TEST(RecentPast, NobodyIsThereSinceTheLastOneWentWhoeverWasTheCoordinator) {
+  RecentPast past;
+  std::int64_t time = 0;
+  const auto add = [&](FarmEventKind kind, const std::string& worker = {}) {
+    past.add({.time_ms = ++time, .kind = kind, .worker = worker});
+  };
+  using enum FarmEventKind;
+  add(coordinator_started);
+  EXPECT_EQ(past.alone_since_ms(), 1);
+  add(worker_joined, "a");
+  EXPECT_EQ(past.alone_since_ms(), 0);
+  add(worker_drained, "a");
+  add(worker_left, "a");
+  add(coordinator_started);
+  EXPECT_EQ(past.alone_since_ms(), 4) << "not since the start";
+  ASSERT_NE(past.absent("a"), nullptr);
+  EXPECT_EQ(past.absent("a")->absence, Absence::left);
+  EXPECT_EQ(past.absent("a")->reason, "it was told to finish");
+  EXPECT_THAT(past.lost(0), IsEmpty());
+  add(worker_joined, "a");
+  EXPECT_EQ(past.absent("a"), nullptr);
+  add(coordinator_started);
+  EXPECT_EQ(past.alone_since_ms(), 7) << "it went with the coordinator before";
 }
 
 }  // namespace
