@@ -15,8 +15,9 @@ constexpr std::uint64_t kMaxTokenBytes = 1 << 20;
 
 }  // namespace
 
-std::filesystem::path output_token_file(const std::filesystem::path& folder, const Digest& job) {
-  return folder / (".baton-" + job.short_hex());
+std::filesystem::path output_token_file(const std::filesystem::path& folder, const Digest& job,
+                                        const std::string& token) {
+  return folder / (".baton-" + digest_of(as_bytes_view(job.hex() + token)).short_hex());
 }
 
 Result<std::string> make_token(const std::filesystem::path& file, const std::string& known) {

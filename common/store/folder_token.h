@@ -12,8 +12,10 @@ namespace baton {
 /// The token of a folder is a text in a small file of it. Who reads it there sees the folder that
 /// somebody else marked, and not an empty one that only has its name.
 
-/// Where the coordinator marks the output folder of an open job.
-std::filesystem::path output_token_file(const std::filesystem::path& folder, const Digest& job);
+/// Where the coordinator of this token marks the output folder of an open job. Another one may have
+/// the same job open in the same folder.
+std::filesystem::path output_token_file(const std::filesystem::path& folder, const Digest& job,
+                                        const std::string& token);
 
 /// The token in `file`; where there is none yet, `known` or, if that is empty, a new random one (16
 /// hex digits).

@@ -222,7 +222,7 @@ Status FarmCore::perform(const RecordJobStatus& action) {
   }
   remove_job_file(action.job, action.status);
   if (job != nullptr && !is_open(action.status)) {
-    unmarked_[action.job] = output_token_file(job->spec.output.directory, action.job);
+    unmarked_[action.job] = output_token_file(job->spec.output.directory, action.job, token);
     marked_.erase(action.job);
     BATON_TRY(journal.record_output_mark(action.job, std::nullopt));
   }
@@ -320,7 +320,10 @@ Result<bool> FarmCore::may_replace(const Digest& job, const JobSpec& spec, const
                                    const FileVerdict& picture) {
   records_.erase(job);
   BATON_ASSIGN(FolderRecord* const record, record_of(job, spec));
-  if (!record->may_replace(path, picture)) return false;
+  const Scheduler::Job* const known = scheduler.find_job(job);
+  const bool is_by_one = known != nullptr && !known->is_mixed;
+  if (!record->may_replace(path, picture, is_by_one ? known->renderer : std::string()))
+    return false;
   record->give_up(path, picture.digest);
   return true;
 }
@@ -361,11 +364,11 @@ Status FarmCore::take_up_marks() {
 Result<std::string> FarmCore::mark_output(const Digest& job) {
   const Scheduler::Job* const open = scheduler.find_job(job);
   if (open == nullptr || !is_open(open->status)) return std::string();
-  const fs::path file = output_token_file(open->spec.output.directory, job);
+  const fs::path file = output_token_file(open->spec.output.directory, job, token);
   const std::string frames = format_frames(locked(job, open->spec).numbers(open->spec));
   if (!frames.empty())
-    BATON_TRY(
-        tell_locks(journal, open->spec, history.jobs(), history.jobs().of(job).id, options.roots));
+    BATON_TRY(tell_locks_again(journal, open->spec, history.jobs(), history.jobs().of(job).id,
+                               options.roots));
   const Result<std::string> there = read_after_token(file, token);
   if (marked_.contains(job) && (lost_mark(job, open->spec) || (there && *there == frames)))
     return token;
@@ -385,7 +388,7 @@ Status FarmCore::mark_output_again(const Digest& job) {
 std::optional<std::string> FarmCore::lost_mark(const Digest& job, const JobSpec& spec) const {
   if (!marked_.contains(job)) return std::nullopt;
   const fs::path folder = spec.output.directory;
-  const fs::path file = output_token_file(folder, job);
+  const fs::path file = output_token_file(folder, job, token);
   const Result<bool> is_ours = has_token(file, token);
   if (!is_ours || *is_ours) return std::nullopt;
   std::error_code error;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <span>
 
+#include "common/base/patiently.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
@@ -19,7 +20,8 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& fol
                                         const Digest& version, const JobId& id) {
   FolderRecord record;
   record.jobs_.push_back(version);
-  if (auto locks = locks_of_others(folder, id.hex())) record.locked_ = std::move(*locks);
+  if (auto locks = patiently([&] { return locks_of_others(folder, id.hex()); }))
+    record.locked_ = std::move(*locks);
   BATON_ASSIGN(const auto given_up, journal.given_up(id));
   for (const auto& [file, picture] : given_up) record.given_up_[fs::path(folder) / file] = picture;
   BATON_ASSIGN(const std::vector<Digest> jobs, jobs_in_folder(journal, folder));
@@ -47,7 +49,14 @@ std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
   return recorded;
 }
 
-bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture) const {
+namespace {
+
+bool is_by(const std::string& writer, const Digest& job) { return writer.starts_with(job.hex()); }
+
+}  // namespace
+
+bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture,
+                               const std::string& renderer) const {
   if (is_locked(path)) return false;
   const auto given_up = given_up_.find(path);
   if (given_up != given_up_.end() && given_up->second == picture.digest) return true;
@@ -58,15 +67,14 @@ bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture)
                           [&](const Image& image) { return image.image.digest == picture.digest; }))
     return true;
   const auto writer =
-      std::ranges::find_if(jobs_, [&](const Digest& job) { return job.hex() == picture.writer; });
-  return writer != jobs_.end() &&
+      std::ranges::find_if(jobs_, [&](const Digest& job) { return is_by(picture.writer, job); });
+  return writer != jobs_.end() && (renderer.empty() || picture.writer.ends_with(' ' + renderer)) &&
          std::ranges::none_of(images, [&](const Image& image) { return image.job == *writer; });
 }
 
 bool FolderRecord::is_foreign(const FileVerdict& picture) const {
-  return !picture.writer.empty() && std::ranges::none_of(jobs_, [&](const Digest& job) {
-    return job.hex() == picture.writer;
-  });
+  return !picture.writer.empty() &&
+         std::ranges::none_of(jobs_, [&](const Digest& job) { return is_by(picture.writer, job); });
 }
 
 std::vector<Digest> FolderRecord::replaceable(const fs::path& path) const {
@@ -149,7 +157,8 @@ std::string doubt_text(const FramesInDoubt& doubt, const JobId& job) {
     text = fmt::format(
         "{} {} not what a job has written here: {}, which is kept; --restart renders {} again",
         files_text(frames), is_one ? "is" : "are",
-        are_foreign ? "by a job that this coordinator does not know (deleted, or another's)"
+        are_foreign ? "by a job that is none of this folder's (deleted, moved, or another "
+                      "coordinator's)"
                     : "another picture, changed or replaced",
         is_one ? "it" : "them");
     if (!job.empty())

@@ -40,6 +40,14 @@ std::vector<FrameNumber> IdentityBook::locked(const JobId& job) const {
   return {found->second.locked.begin(), found->second.locked.end()};
 }
 
+std::vector<JobId> IdentityBook::with_locks() const {
+  std::vector<JobId> ids;
+  for (const auto& [id, job] : jobs_) {
+    if (!job.locked.empty()) ids.push_back(id);
+  }
+  return ids;
+}
+
 std::int32_t IdentityBook::priority(const JobId& job, std::int32_t written) const {
   const auto found = jobs_.find(job);
   const bool is_set =

@@ -22,6 +22,8 @@ class IdentityBook {
   /// Frames of a job that count as done, whatever is in their files; ascending. None where it is
   /// not known.
   std::vector<FrameNumber> locked(const JobId& job) const;
+  /// Those that have locked frames.
+  std::vector<JobId> with_locks() const;
   /// The priority of a job whose document says `written`.
   std::int32_t priority(const JobId& job, std::int32_t written) const;
   bool is_newest(const Digest& document) const;

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "common/base/file_stamp.h"
+#include "common/base/patiently.h"
 #include "common/job/file_sequence.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
@@ -77,26 +78,34 @@ std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNu
   return files;
 }
 
-Status tell_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs, const JobId& id,
-                  const Roots& roots) {
+Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Digest>& versions,
+                  const JobId& id, const std::vector<FrameNumber>& locked, const Roots& roots) {
   if (!check_output_root(spec, roots)) return {};
-  const std::set<std::string> files = frame_files(spec, jobs.locked(id));
-  const Status written = record_locks(spec.output.directory, id.hex(), files);
-  if (!written)
-    spdlog::warn("locks are not known to other coordinators: {}", written.error().message);
+  std::set<std::string> files = frame_files(spec, locked);
+  for (const Digest& version : locked.empty() ? std::vector<Digest>() : versions) {
+    BATON_ASSIGN(const std::optional<std::string> text, journal.document(version));
+    const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+    if (document) files.merge(frame_files(document->job, locked));
+  }
+  BATON_TRY(record_locks(spec.output.directory, id.hex(), files));
   // The folder's name may lead elsewhere tomorrow.
   const std::string today = resolve_folder(spec.output.directory);
-  const std::vector<Digest> versions = jobs.versions(id);
   if (!files.empty() && !versions.empty())
     BATON_TRY(journal.record_marked_folder(versions.back(), today));
   for (const Digest& version : versions) {
     BATON_ASSIGN(const std::vector<std::string> folders, journal.marked_folders(version));
     for (const std::string& folder : folders) {
-      if (folder == today) continue;
-      if (const Status left = retain_locks(folder, id.hex(), files); !left)
-        spdlog::warn("locks stay for other coordinators: {}", left.error().message);
+      if (folder != today) BATON_TRY(retain_locks(folder, id.hex(), files));
     }
   }
+  return {};
+}
+
+Status tell_locks_again(Journal& journal, const JobSpec& spec, const IdentityBook& jobs,
+                        const JobId& id, const Roots& roots) {
+  const Status told = tell_locks(journal, spec, jobs.versions(id), id, jobs.locked(id), roots);
+  if (told || told.error().kind != ErrorKind::io) return told;
+  spdlog::warn("other coordinators do not see which frames are locked: {}", told.error().message);
   return {};
 }
 
@@ -124,7 +133,7 @@ Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frame
 }
 
 Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id) {
-  const auto locks = locks_of_others(spec.output.directory, id.hex());
+  const auto locks = patiently([&] { return locks_of_others(spec.output.directory, id.hex()); });
   if (!locks) return Error{ErrorKind::io, locks.error().message};
   std::vector<FrameNumber> strange;
   std::map<JobId, std::vector<FrameNumber>> known;
@@ -145,10 +154,10 @@ Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, co
   return Error{
       ErrorKind::bad_input,
       fmt::format("job '{}': frames {} in {} are locked by a job of another coordinator, and stay: "
-                  "unlock them there or, if it is gone, remove {}; another output.directory keeps "
-                  "them",
+                  "unlock them there or, if it is gone, remove its file in {}; another "
+                  "output.directory keeps them",
                   spec.name, format_frames(strange), spec.output.directory,
-                  lock_file(spec.output.directory).string())};
+                  lock_folder(spec.output.directory).string())};
 }
 
 Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,

@@ -41,11 +41,16 @@ Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
                                                const Scheduler::Job* job);
 /// Names of the files of frames, in the job's folder.
 std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNumber>& frames);
-/// Writes the locks of a job into its output folder, for other coordinators, and takes those off
-/// that stand in folders to which its name led before and are no more. Where that cannot be
-/// written, they do not learn of it. Errors: the journal's.
-Status tell_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs, const JobId& id,
-                  const Roots& roots);
+/// Writes into a job's output folder, for other coordinators, that these of its frames are locked,
+/// under the names that they have in any of its versions, and takes those off that stand in folders
+/// to which its name led before and are no more. Errors, io: that cannot be written; and the
+/// journal's.
+Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Digest>& versions,
+                  const JobId& id, const std::vector<FrameNumber>& locked, const Roots& roots);
+/// The same of what is locked now; where it cannot be written, that is logged, and others do not
+/// learn of it before it is said again. Errors: the journal's.
+Status tell_locks_again(Journal& journal, const JobSpec& spec, const IdentityBook& jobs,
+                        const JobId& id, const Roots& roots);
 /// Takes locks of jobs that are known, and have none any more, off the job's output folder: it may
 /// have had another name when they were put there.
 void drop_stale_locks(const JobSpec& spec, const IdentityBook& jobs);

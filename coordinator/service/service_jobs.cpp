@@ -56,6 +56,15 @@ Status Service::restore_jobs() {
   BATON_ASSIGN(const std::vector<Digest> jobs, farm_.journal.jobs());
   patient_until_ = std::chrono::steady_clock::now() + farm_.options.file_patience;
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
+  for (const JobId& id : farm_.history.jobs().with_locks()) {
+    // A folder may have been away when frames in it were locked or unlocked.
+    BATON_ASSIGN(const std::optional<std::string> text,
+                 farm_.journal.document(farm_.history.jobs().versions(id).back()));
+    const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+    if (!document) continue;
+    BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
+                               farm_.options.roots));
+  }
   BATON_TRY(farm_.archive_ended());
   BATON_TRY(farm_.count_kept());
   BATON_TRY(farm_.journal.commit());
@@ -199,6 +208,10 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     return farm_.refuse(peer, folder.error());
   BATON_ASSIGN(const JobId id, submission.known_job(*document));
   drop_stale_locks(document->job, farm_.history.jobs());
+  if (!farm_.history.jobs().locked(id).empty()) {
+    BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
+                               farm_.options.roots));
+  }
   const Status free = expect_no_strange_locks(document->job, farm_.history.jobs(), id);
   if (!free) return farm_.refuse(peer, free.error());
   const LockedFrames locked(document->job, farm_.history.jobs().locked(id));
@@ -286,6 +299,10 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
   const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
   if (!document) return farm_.refuse(peer, document.error());
+  std::error_code error;
+  if (!std::filesystem::is_directory(document->job.output.directory, error))
+    return farm_.refuse(
+        peer, {ErrorKind::io, document->job.output.directory + ": the output folder is not there"});
   std::vector<FrameNumber> frames = message.frames;
   std::ranges::sort(frames);
   frames.erase(std::ranges::unique(frames).begin(), frames.end());
@@ -296,7 +313,12 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   std::vector<FrameNumber> after;
   if (message.off) {
     const Status may = expect_locked(id, before, frames);
-    if (!may) return farm_.refuse(peer, may.error());
+    if (!may) {
+      // The folder may have been away when they were unlocked.
+      BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
+                                 farm_.options.roots));
+      return farm_.refuse(peer, may.error());
+    }
     std::ranges::set_difference(before, frames, std::back_inserter(after));
   } else {
     Result<std::vector<FrameIndex>> found = frames_to_lock(document->job, frames, known);
@@ -313,6 +335,13 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
     if (!odd) return {};
     fault = fault_text(*odd, id);
   }
+  // A lock that others cannot see is none: they would replace the frame.
+  if (!message.off) {
+    const Status told = tell_locks(farm_.journal, document->job, farm_.history.jobs().versions(id),
+                                   id, after, farm_.options.roots);
+    if (!told)
+      return farm_.refuse(peer, {told.error().kind, "nothing is locked: " + told.error().message});
+  }
   BATON_TRY(farm_.history.locked(*job, frames, !message.off));
   const std::set<std::string> files = frame_files(document->job, frames);
   BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return files.contains(file); }));
@@ -320,8 +349,8 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
   if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
-  BATON_TRY(
-      tell_locks(farm_.journal, document->job, farm_.history.jobs(), id, farm_.options.roots));
+  BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
+                             farm_.options.roots));
   // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
   // stand now.
   BATON_ASSIGN(const bool ends_again, farm_.ended_by_frames(*job, fault, message.off));
@@ -372,8 +401,8 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   const std::vector<FrameNumber> locked = farm_.history.jobs().locked(id);
   if (document && !locked.empty()) {
     BATON_TRY(farm_.history.locked(*job, locked, false));
-    BATON_TRY(
-        tell_locks(farm_.journal, document->job, farm_.history.jobs(), id, farm_.options.roots));
+    BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
+                               farm_.options.roots));
   }
   for (const Digest& version : farm_.history.jobs().versions(id)) {
     BATON_TRY(farm_.archive_job(version));

@@ -149,6 +149,46 @@ def a_lock_holds_for_other_coordinators(programs, folder):
         programs.run("baton", *command, "--restart", expect=OK)
 
 
+def a_lock_is_seen_by_others_or_refused(programs, folder):
+    """Where it cannot be written into the folder nothing is locked; it has every name that a frame had in the job's versions."""
+    with Farm(programs, folder / "farm", workers=1) as farm:
+        ident = farm.submit(make(folder))
+        farm.wait_for(ident)
+        in_the_way = folder / "frames/.baton-locked"
+        in_the_way.touch()
+        check_says(farm.baton("job", "lock", ident, "--frames", "2", expect=IO).stderr, "nothing is locked")
+        check("locked" not in farm.baton("job", "show", ident).stdout, "a lock that nobody sees")
+        in_the_way.unlink()
+
+        farm.baton("job", "lock", ident, "--frames", "2")
+        (folder / "frames/other.0002.exr").write_bytes(frame(folder, 2).read_bytes())
+        farm.wait_for(farm.submit(make(folder, output={"pattern": "other.####.exr"})))
+        refused = programs.run("baton", "render", make(folder), "--work-dir", folder / "work", "--restart", expect=BAD_INPUT)
+        check_says(refused.stderr, "frames 2 in", "are locked by a job of another coordinator")
+
+        # Neither locked nor unlocked in a folder that is away.
+        (folder / "frames").rename(folder / "away")
+        for off in ([], ["--off"]):
+            check_says(farm.baton("job", "lock", ident, "--frames", "2", *off, expect=None).stderr, "frames", "not there")
+        check(not (folder / "frames").exists(), "a folder that is away is made anew")
+        (folder / "away").rename(folder / "frames")
+        farm.baton("job", "lock", ident, "--frames", "2", "--off")
+        check(not in_the_way.exists(), "the lock stays in the folder")
+
+
+def two_coordinators_have_one_job_open(programs, folder):
+    """The same document in the same folder: neither takes the other's mark for a sign of another folder."""
+    expected = undisturbed(programs, folder)
+    with Farm(programs, folder / "farm") as farm, Farm(programs, folder / "other", workers=1) as other:
+        path = make(folder)
+        waiting, done = farm.submit(path), other.submit(path)
+        other.wait_for(done)
+        farm.start_worker()
+        farm.wait_for(waiting)
+        check("not the output folder" not in farm.coordinator.log() + other.coordinator.log(), "the folder is another's")
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
 def what_is_unlocked_is_looked_at(programs, folder):
     """Gone: it is rendered; another picture: the job has failed."""
     expected = undisturbed(programs, folder)

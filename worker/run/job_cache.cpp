@@ -128,14 +128,16 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
 
 Status expect_output_folder(const LoadedJob& loaded, const std::stop_token& stop) {
   if (loaded.token.empty()) return {};
-  const std::filesystem::path mark = output_token_file(loaded.job.output.directory, loaded.digest);
+  const std::filesystem::path mark =
+      output_token_file(loaded.job.output.directory, loaded.digest, loaded.token);
   Patience patience(stop);
   return expect_token(mark, loaded.token, &patience);
 }
 
 Status expect_unlocked(const LoadedJob& loaded, FrameIndex frame, const std::stop_token& stop) {
   if (loaded.token.empty()) return {};
-  const std::filesystem::path mark = output_token_file(loaded.job.output.directory, loaded.digest);
+  const std::filesystem::path mark =
+      output_token_file(loaded.job.output.directory, loaded.digest, loaded.token);
   Patience patience(stop);
   BATON_ASSIGN(const std::string locked, read_after_token(mark, loaded.token, &patience));
   if (locked.empty()) return {};

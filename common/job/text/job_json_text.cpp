@@ -14,7 +14,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostShown = 300;  ///< bytes of a message, of which a token is a part
+/// Bytes of a message, of which a token is a part.
+constexpr std::size_t kMostShown = 300;
 
 /// The first `size` bytes, or fewer, so that no character is cut.
 std::string_view beginning_of(std::string_view text, std::size_t size) {

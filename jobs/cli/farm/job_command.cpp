@@ -29,6 +29,7 @@ using nlohmann::ordered_json;
 
 constexpr std::chrono::milliseconds kPollInterval{500};
 constexpr std::chrono::minutes kWaitPatience{5};
+constexpr char kAway[] = "away", kPaused[] = "paused";  // among what was told
 
 struct JobOptions {
   CoordinatorLink link;
@@ -118,6 +119,9 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
       const bool away = answer.error().kind == ErrorKind::timeout && last_answer &&
                         Clock::now() - *last_answer < kWaitPatience;
       if (!away) return answer.error();
+      if (told.insert(kAway).second)
+        fmt::print(stderr, "the coordinator does not answer: waits {} minutes for it\n",
+                   kWaitPatience.count());
       if (options.timeout_s > 0 && waited.count() >= options.timeout_s) return ExitCode::timeout;
       std::this_thread::sleep_for(kPollInterval);
       continue;
@@ -135,9 +139,13 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
       print_detail(*answer, options.json);
       return is_open(detail.summary.status) ? ExitCode::timeout : exit_code_of(detail);
     }
-    if (detail.waits.empty()) told.clear();
+    const bool is_paused = detail.summary.status == JobStatus::paused;
+    if (detail.waits.empty() && !is_paused) told.clear();
     if (!detail.waits.empty() && told.insert(detail.waits).second)
       fmt::print(stderr, "waits for {}\n", detail.waits);
+    if (detail.waits.empty() && is_paused && told.insert(kPaused).second)
+      fmt::print(stderr, "is paused: `baton job resume {}` goes on\n",
+                 answer->identity.id.short_hex());
     std::this_thread::sleep_for(kPollInterval);
   }
 }

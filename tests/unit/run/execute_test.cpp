@@ -272,7 +272,8 @@ TEST_F(ExecuteTest, AnAssemblyReplacesNeitherAPictureOfOthersNorALockedFrame) {
   grant.may_replace = {digest_of(bytes)};
   LoadedJob marked = *loaded_;
   marked.token = "token";
-  const std::filesystem::path mark = output_token_file(job_.output.directory, marked.digest);
+  const std::filesystem::path mark =
+      output_token_file(job_.output.directory, marked.digest, marked.token);
   ASSERT_TRUE(write_token(mark, marked.token, "2,4-5"));
   output = execute_task(marked, store_.value(), grant, {});
   ASSERT_FALSE(output);

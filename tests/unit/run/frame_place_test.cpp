@@ -74,12 +74,35 @@ TEST_F(FramePlaceTest, WhatOthersHaveLockedStays) {
   ASSERT_TRUE(record_locks(folder, JobId{8}.hex(), {}));
   EXPECT_FALSE(find({there}));
   ASSERT_TRUE(record_locks(folder, kJob.hex(), {}));
-  EXPECT_FALSE(fs::exists(lock_file(folder)));
+  EXPECT_FALSE(fs::exists(lock_folder(folder)));
 
-  ASSERT_TRUE(write_file_atomic(lock_file(folder), as_bytes_view("?")));
+  fs::create_directories(lock_folder(folder) / JobId{8}.hex());
   const auto unknown = look_at_place(frame, made, {there}, kJob);
   ASSERT_FALSE(unknown) << "nothing is replaced while locks cannot be read";
-  EXPECT_FALSE(record_locks(folder, kJob.hex(), {name})) << "and what is none of ours stays";
+  EXPECT_EQ(unknown.error().kind, ErrorKind::io);
+}
+
+// Nobody reads, changes and writes what another one writes at the same time.
+TEST_F(FramePlaceTest, LocksOfTwoAreKeptWhoeverWritesMeanwhile) {
+  const std::string ids[] = {JobId{7}.hex(), JobId{8}.hex()};
+  std::vector<std::thread> writers;
+  for (const std::string& id : ids) {
+    writers.emplace_back([&, id] {
+      for (int i = 0; i < 200; ++i) {
+        EXPECT_TRUE(record_locks(folder, id, {}));
+        EXPECT_TRUE(record_locks(folder, id, {id + ".exr"}));
+        EXPECT_TRUE(locks_of_others(folder, "").value().contains(id + ".exr"));
+      }
+    });
+  }
+  for (std::thread& writer : writers) writer.join();
+  EXPECT_EQ(locks_of_others(folder, "").value().size(), 2u);
+}
+
+TEST_F(FramePlaceTest, NothingIsLockedInAFolderThatIsNotThere) {
+  EXPECT_FALSE(record_locks(folder / "unmounted", kJob.hex(), {"frame.exr"}));
+  EXPECT_TRUE(record_locks(folder / "unmounted", kJob.hex(), {}));
+  EXPECT_FALSE(fs::exists(folder / "unmounted"));
 }
 
 }  // namespace

@@ -42,7 +42,8 @@ struct FramesTest : ServiceTest {
     ASSERT_TRUE(write_file_atomic(frame(number), as_bytes_view(text)).ok());
   }
   fs::path mark(const Digest& id) const {
-    return fs::path(job.output.directory) / (".baton-" + id.short_hex());
+    return output_token_file(job.output.directory, id,
+                             read_text_file(store() / "token", 100).value());
   }
 
   /// Submits the job, has its folder marked, and does all but its last task.

@@ -244,12 +244,11 @@ TEST_F(FramesTest, AThousandFramesThatStandAsReportedAreNotRead) {
 TEST_F(FramesTest, AnOpenJobHasItsMarkBeforeAnybodyAsksForItsDocument) {
   const RunningService service(options);
   const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
-  const fs::path mark = output_token_file(job.output.directory, id);
-  EXPECT_TRUE(fs::exists(mark));
+  EXPECT_TRUE(fs::exists(mark(id)));
   ask<ShownJob>(service.endpoint(), CancelJob{id.hex()}).detail;
   fs::remove_all(job.output.directory);
   ask<JobAccepted>(service.endpoint(), SubmitJob{document});
-  EXPECT_TRUE(fs::exists(mark));
+  EXPECT_TRUE(fs::exists(mark(id)));
 }
 
 // A frame that was readable meanwhile is waited for anew.
