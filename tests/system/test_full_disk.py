@@ -16,11 +16,11 @@ set -e
 disk=$1
 mkdir -p "$disk" && mount -t tmpfs -o size=32m none "$disk"
 head -c "$2" /dev/zero > "$disk/filler"
-wait_for() { while ! [ -e "$disk.$1" ]; do sleep 0.05; done; }
+wait_for() { while ! [ -e "$disk.$1" ]; do [ -e "/proc/$$" ] || exit 0; sleep 0.05; done; }
 (wait_for free; rm "$disk"/filler*) &
 (wait_for fill; cat /dev/zero > "$disk/filler-all" 2>/dev/null || true; touch "$disk.full") &
 shift; shift
-"$@"
+exec "$@"
 """
 
 
