@@ -320,10 +320,7 @@ Result<bool> FarmCore::may_replace(const Digest& job, const JobSpec& spec, const
                                    const FileVerdict& picture) {
   records_.erase(job);
   BATON_ASSIGN(FolderRecord* const record, record_of(job, spec));
-  const Scheduler::Job* const known = scheduler.find_job(job);
-  const bool is_by_one = known != nullptr && !known->is_mixed;
-  if (!record->may_replace(path, picture, is_by_one ? known->renderer : std::string()))
-    return false;
+  if (!record->may_replace(path, picture)) return false;
   record->give_up(path, picture.digest);
   return true;
 }

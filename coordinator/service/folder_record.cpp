@@ -49,14 +49,7 @@ std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
   return recorded;
 }
 
-namespace {
-
-bool is_by(const std::string& writer, const Digest& job) { return writer.starts_with(job.hex()); }
-
-}  // namespace
-
-bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture,
-                               const std::string& renderer) const {
+bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture) const {
   if (is_locked(path)) return false;
   const auto given_up = given_up_.find(path);
   if (given_up != given_up_.end() && given_up->second == picture.digest) return true;
@@ -67,14 +60,15 @@ bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture,
                           [&](const Image& image) { return image.image.digest == picture.digest; }))
     return true;
   const auto writer =
-      std::ranges::find_if(jobs_, [&](const Digest& job) { return is_by(picture.writer, job); });
-  return writer != jobs_.end() && (renderer.empty() || picture.writer.ends_with(' ' + renderer)) &&
+      std::ranges::find_if(jobs_, [&](const Digest& job) { return job.hex() == picture.writer; });
+  return writer != jobs_.end() &&
          std::ranges::none_of(images, [&](const Image& image) { return image.job == *writer; });
 }
 
 bool FolderRecord::is_foreign(const FileVerdict& picture) const {
-  return !picture.writer.empty() &&
-         std::ranges::none_of(jobs_, [&](const Digest& job) { return is_by(picture.writer, job); });
+  return !picture.writer.empty() && std::ranges::none_of(jobs_, [&](const Digest& job) {
+    return job.hex() == picture.writer;
+  });
 }
 
 std::vector<Digest> FolderRecord::replaceable(const fs::path& path) const {

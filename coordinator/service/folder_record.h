@@ -29,9 +29,7 @@ class FolderRecord {
   /// Whether a picture in the place of a frame may be replaced: a person has given it up, or it is
   /// a job's of this folder, one that is recorded, or one that was written and never reported. None
   /// that another job has locked (common/store/frame_locks.h), none while that cannot be read.
-  /// renderer: what such a one was rendered with, or it is another coordinator's; empty: anything.
-  bool may_replace(const std::filesystem::path& path, const FileVerdict& picture,
-                   const std::string& renderer = {}) const;
+  bool may_replace(const std::filesystem::path& path, const FileVerdict& picture) const;
   /// Whether a picture is as a job wrote it that is none of this folder's.
   bool is_foreign(const FileVerdict& picture) const;
   /// Those of which only the digest must be known for that: at most kMostTold, the newest of them.

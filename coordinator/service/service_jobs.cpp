@@ -185,6 +185,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   // Jobs that ended in this turn of the loop are read from the archive, too.
   BATON_TRY(farm_.archive_ended());
   // A job that cannot be run is refused before it leaves a trace.
+  if (const Status written = expect_written_document(message.json); !written)
+    return farm_.refuse(peer, written.error());
   Result<ParsedJobDocument> document = parse_farm_document(message.json);
   if (!document) return farm_.refuse(peer, document.error());
   if (const Status within = check_roots(*document, farm_.options.roots); !within) {
@@ -299,16 +301,20 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
   const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
   if (!document) return farm_.refuse(peer, document.error());
-  std::error_code error;
-  if (!std::filesystem::is_directory(document->job.output.directory, error))
-    return farm_.refuse(
-        peer, {ErrorKind::io, document->job.output.directory + ": the output folder is not there"});
   std::vector<FrameNumber> frames = message.frames;
   std::ranges::sort(frames);
   frames.erase(std::ranges::unique(frames).begin(), frames.end());
   const JobId id = farm_.history.jobs().of(*job).id;
   const std::vector<FrameNumber> before = farm_.history.jobs().locked(id);
   const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
+  const bool is_open_now = known != nullptr && is_open(known->status);
+  // Renamed for good or away for a moment: what is in it is unlocked, and nothing is made in its
+  // place.
+  std::error_code error;
+  const bool is_away = !std::filesystem::is_directory(document->job.output.directory, error);
+  if (is_away && is_open_now)
+    return farm_.refuse(
+        peer, {ErrorKind::io, document->job.output.directory + ": the output folder is not there"});
   std::vector<FrameIndex> places;
   std::vector<FrameNumber> after;
   if (message.off) {
@@ -328,7 +334,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   }
   // How the frames of a job that has ended stand then.
   std::string fault;
-  if (known == nullptr || !is_open(known->status)) {
+  if (!is_open_now && !is_away) {
     const LockedFrames locked(document->job, after);
     BATON_ASSIGN(const std::optional<OddFrames> odd,
                  await_frames(peer, message, {*job, id}, document->job, locked));
@@ -353,6 +359,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
                              farm_.options.roots));
   // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
   // stand now.
+  if (is_away) return answer_detail(peer, *job);
   BATON_ASSIGN(const bool ends_again, farm_.ended_by_frames(*job, fault, message.off));
   if (ends_again && fault.empty())
     BATON_TRY(

@@ -94,7 +94,10 @@ Status claim_look_folder(const std::filesystem::path& folder, bool may_replace) 
   std::error_code error;
   if (std::filesystem::exists(mark, error)) return {};
   std::filesystem::create_directories(folder, error);
-  const bool is_empty = !error && std::filesystem::is_empty(folder, error);
+  bool is_empty = true;  // but for what Baton has put there for its work
+  std::filesystem::directory_iterator files(folder, error);
+  for (; !error && files != std::filesystem::directory_iterator(); files.increment(error))
+    is_empty = is_empty && files->path().filename().string().starts_with(".baton");
   if (error) return Error{ErrorKind::io, fmt::format("{}: {}", folder.string(), error.message())};
   if (!is_empty && !may_replace) {
     return Error{ErrorKind::bad_input,

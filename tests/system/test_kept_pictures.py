@@ -166,13 +166,14 @@ def a_lock_is_seen_by_others_or_refused(programs, folder):
         refused = programs.run("baton", "render", make(folder), "--work-dir", folder / "work", "--restart", expect=BAD_INPUT)
         check_says(refused.stderr, "frames 2 in", "are locked by a job of another coordinator")
 
-        # Neither locked nor unlocked in a folder that is away.
+        # In a folder that is away nothing is locked, and what is unlocked is told there once it is back.
         (folder / "frames").rename(folder / "away")
-        for off in ([], ["--off"]):
-            check_says(farm.baton("job", "lock", ident, "--frames", "2", *off, expect=None).stderr, "frames", "not there")
+        check_says(farm.baton("job", "lock", ident, "--frames", "3", expect=None).stderr, "not there")
+        farm.baton("job", "lock", ident, "--frames", "2", "--off")
         check(not (folder / "frames").exists(), "a folder that is away is made anew")
         (folder / "away").rename(folder / "frames")
-        farm.baton("job", "lock", ident, "--frames", "2", "--off")
+        check(in_the_way.exists(), "nobody has said it there")
+        farm.baton("job", "submit", folder / "job.json", expect=None)
         check(not in_the_way.exists(), "the lock stays in the folder")
 
 

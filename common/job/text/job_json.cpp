@@ -170,7 +170,11 @@ std::string with_sweeps(ParsedJobDocument document, int sweeps) {
 }
 
 Result<ParsedJobDocument> parse_job_document(std::string_view text) {
-  BATON_ASSIGN(ParsedJobDocument document, read<ParsedJobDocument>(text, "job document", "/"));
+  BATON_ASSIGN(json root, parse_json_text(text, "job document"));
+  ParsedJobDocument document;
+  JobJsonReader reader("job document", "/");
+  reader.forbid_files();
+  BATON_TRY(reader.read(std::move(root), [&] { fields(reader, document); }));
   if (document.job.sampling.method == Method::automatic) {
     return Error{
         ErrorKind::bad_input,
@@ -179,6 +183,15 @@ Result<ParsedJobDocument> parse_job_document(std::string_view text) {
   document.digest = digest_of(text);
   document.picture = picture_digest(document.job, document.assets);
   return document;
+}
+
+Status expect_written_document(std::string_view text) {
+  BATON_ASSIGN(ParsedJobDocument document, parse_job_document(text));
+  if (write(std::move(document), -1) == text) return {};
+  return Error{
+      ErrorKind::bad_input,
+      "job document: expected it as `baton` writes one, without more blanks or other forms "
+      "of values"};
 }
 
 Status verify_assets(const std::vector<AssetDigest>& assets) {

@@ -345,6 +345,7 @@ void JobJsonReader::visit(const json& value, Place place, const Body& body, Obje
 }
 
 void JobJsonReader::visit_file(const json& value, const std::string& path, const Body& body) {
+  if (!may_read_files_) return fault_at(path, "expected an object, got " + shown(value));
   std::string name;
   if (!read_text(path, value, name)) return;
   Place place = place_;

@@ -21,6 +21,8 @@ class JobJsonReader final : public JobArchive {
   JobJsonReader(std::string name, const std::filesystem::path& base_directory,
                 const std::vector<JobOverride>& overrides = {});
 
+  /// A text that somebody else has written: no part of it may be in a file, which nobody has seen.
+  void forbid_files() { may_read_files_ = false; }
   /// Visits the root object. One error lists every fault, one per line.
   Status read(nlohmann::json root, const Body& body);
   /// Paths of the optional values that the text does not give.
@@ -72,6 +74,7 @@ class JobJsonReader final : public JobArchive {
   void visit_file(const nlohmann::json& json, const std::string& path, const Body& body);
   void report_unknown_keys();
 
+  bool may_read_files_ = true;
   Place place_;
   std::list<nlohmann::json> documents_;  ///< other files; places point into them
   JobOverrides overrides_;

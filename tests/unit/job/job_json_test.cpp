@@ -234,6 +234,24 @@ TEST(JobJson, RefusesKeysGivenTwiceAndDeepNesting) {
             "job.json: expected at most 32 levels, got more");
 }
 
+// What a coordinator gets may be anybody's: it reads no other file, and keeps nothing that says
+// nothing.
+TEST(JobJson, ADocumentIsWhole) {
+  JobSpec job = parsed(job_text(""));
+  job.motion.max_px = 1;
+  ParsedJobDocument document{.job = job, .assets = {}, .digest = {}, .picture = {}};
+  const std::string text = with_sweeps(document, 2);
+  EXPECT_TRUE(expect_written_document(text));
+  EXPECT_FALSE(expect_written_document(text + " "));
+  EXPECT_THAT(expect_written_document(" " + text).error().message, HasSubstr("as `baton` writes"));
+  const std::size_t scene = text.find("\"scene\":{");
+  ASSERT_NE(scene, std::string::npos);
+  const std::string filed = text.substr(0, scene) + R"("scene":"/etc/hostname","more":{)" +
+                            text.substr(scene + std::string("\"scene\":{").size());
+  EXPECT_THAT(parse_job_document(filed).error().message,
+              HasSubstr("$.job.scene: expected an object, got \"/etc/hostname\""));
+}
+
 // A parser that takes time with the square of an object's members would need half an hour.
 TEST(JobJson, ManyMembersAreReadInTimeThatGrowsWithThem) {
   std::string text = "{\"scene\": {\"materials\": {";
