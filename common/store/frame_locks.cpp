@@ -79,10 +79,13 @@ Result<std::map<std::string, std::string>> locks_of_others(const fs::path& folde
     const std::string id = files->path().filename().string();
     if (id == job || id.starts_with('.')) continue;
     Result<std::set<std::string>> names = read_names(files->path());
+    // Unlocked while it was looked at.
+    if (std::error_code gone; !names && !fs::exists(files->path(), gone) && !gone) continue;
     if (!names) return Error{ErrorKind::io, names.error().message};
     for (const std::string& name : *names) others[name] = id;
   }
-  if (error) return disk_error(lock_folder(folder), error);
+  if (error && error != std::errc::no_such_file_or_directory)
+    return disk_error(lock_folder(folder), error);
   return others;
 }
 
