@@ -51,7 +51,10 @@ std::optional<std::string> writer_of_frame(const std::string& name, const Bytes&
     const Imf::MultiPartInputFile file(stream, kOpenExrThreads);
     const auto* const text =
         file.header(0).findTypedAttribute<Imf::StringAttribute>("baton:jobDigest");
-    return text != nullptr && is_sealed(name, exr) ? text->value() : std::string();
+    if (text == nullptr || !is_sealed(name, exr)) return std::string();
+    const auto* const renderer =
+        file.header(0).findTypedAttribute<Imf::StringAttribute>("baton:renderer");
+    return renderer == nullptr ? text->value() : text->value() + ' ' + renderer->value();
   } catch (const std::exception&) {  // of OpenEXR
     return std::nullopt;
   }

@@ -6,6 +6,7 @@
 #include <sys/statvfs.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "common/base/check.h"
 #include "common/base/file_descriptor.h"
@@ -93,6 +94,26 @@ bool SqlStatement::is_null(int column) const {
 std::string SqlStatement::text(int column) const {
   const ByteView bytes = blob(column);
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Result<std::vector<std::string>> SqlStatement::texts() {
+  std::vector<std::string> values;
+  while (true) {
+    BATON_ASSIGN(const bool row, step());
+    if (!row) return values;
+    values.push_back(text(0));
+  }
+}
+
+Result<std::vector<Digest>> SqlStatement::digests() {
+  BATON_ASSIGN(const std::vector<std::string> values, texts());
+  std::vector<Digest> digests;
+  for (const std::string& value : values) {
+    const std::optional<Digest> digest = Digest::from_hex(value);
+    if (!digest) return Error{ErrorKind::corrupt, fmt::format("{}: no digest: '{}'", name_, value)};
+    digests.push_back(*digest);
+  }
+  return digests;
 }
 
 ByteView SqlStatement::blob(int column) const {

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
@@ -48,6 +49,11 @@ class SqlStatement {
   bool is_null(int column) const;
   std::string text(int column) const;
   ByteView blob(int column) const;
+
+  /// The first column of all rows that are left.
+  Result<std::vector<std::string>> texts();
+  /// The same as digests. Error, corrupt: one is none.
+  Result<std::vector<Digest>> digests();
 
  private:
   friend class SqlDatabase;

@@ -105,23 +105,10 @@ Status Journal::count_start() {
 // ---- reading ------------------------------------------------------------------------------------
 
 /// Column 0 of every row.
-Result<std::vector<Digest>> Journal::read_digests(SqlStatement& query) const {
-  std::vector<Digest> digests;
-  while (true) {
-    BATON_ASSIGN(const bool row, query.step());
-    if (!row) return digests;
-    const std::optional<Digest> digest = Digest::from_hex(query.text(0));
-    if (!digest)
-      return Error{ErrorKind::corrupt,
-                   fmt::format("{}: no digest: '{}'", database_.name(), query.text(0))};
-    digests.push_back(*digest);
-  }
-}
-
 Result<std::vector<Digest>> Journal::jobs() {
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT digest FROM jobs WHERE archived = 0 ORDER BY position"));
-  return read_digests(query);
+  return query.digests();
 }
 
 Status Journal::for_each_completion(const Digest& job,
@@ -260,7 +247,7 @@ Status Journal::record_store_token(const std::string& token) {
 
 Result<std::set<Digest>> Journal::output_marks() {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT job FROM output_marks"));
-  BATON_ASSIGN(const std::vector<Digest> jobs, read_digests(query));
+  BATON_ASSIGN(const std::vector<Digest> jobs, query.digests());
   return std::set<Digest>(jobs.begin(), jobs.end());
 }
 
@@ -268,12 +255,7 @@ Result<std::vector<std::string>> Journal::marked_folders(const Digest& job) {
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT folder FROM marked_folders WHERE job = ?"));
   query.bind(job);
-  std::vector<std::string> folders;
-  while (true) {
-    BATON_ASSIGN(const bool row, query.step());
-    if (!row) return folders;
-    folders.push_back(query.text(0));
-  }
+  return query.texts();
 }
 
 // ---- writing ------------------------------------------------------------------------------------
@@ -315,7 +297,7 @@ Status Journal::delete_job(const Digest& job) {
         "DELETE FROM frame_files WHERE job = ?", "DELETE FROM output_marks WHERE job = ?",
         "DELETE FROM marked_folders WHERE job = ?", "DELETE FROM versions WHERE document = ?",
         "DELETE FROM renderers WHERE job = ?", "DELETE FROM mixed_jobs WHERE job = ?",
-        "DELETE FROM jobs WHERE digest = ?"})
+        "DELETE FROM former_renderers WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   BATON_TRY(change("DELETE FROM growth WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM priorities WHERE id NOT IN (SELECT id FROM versions)"));
@@ -354,6 +336,16 @@ Status Journal::record_failure(const Failure& failure) {
 Status Journal::record_renderer(const Digest& job, const std::string& renderer, bool is_mixed) {
   if (is_mixed) BATON_TRY(change("INSERT OR IGNORE INTO mixed_jobs (job) VALUES (?)", job));
   return change("INSERT OR REPLACE INTO renderers (job, renderer) VALUES (?, ?)", job, renderer);
+}
+
+Result<std::set<std::string>> Journal::renderers(const Digest& job) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT renderer FROM renderers WHERE job = ?1 UNION "
+                                 "SELECT renderer FROM former_renderers WHERE job = ?1 UNION "
+                                 "SELECT '' FROM mixed_jobs WHERE job = ?1"));
+  query.bind(job);
+  BATON_ASSIGN(const std::vector<std::string> renderers, query.texts());
+  return std::set<std::string>(renderers.begin(), renderers.end());
 }
 
 Status Journal::record_frame_file(const Digest& job, const FrameFile& file) {

@@ -133,6 +133,9 @@ class Journal {
                         const std::vector<BlobRef>& outputs);
   Status record_failure(const Failure& failure);
   Status record_renderer(const Digest& job, const std::string& renderer, bool is_mixed);
+  /// By what this coordinator has had a document rendered, also before it began again; an empty one
+  /// among them: by any. None: nothing of it is rendered yet.
+  Result<std::set<std::string>> renderers(const Digest& job);
   Status record_frame_file(const Digest& job, const FrameFile& file);
   /// folder: that is marked now; nullopt: the mark goes.
   Status record_output_mark(const Digest& job, const std::optional<std::string>& folder);
@@ -212,7 +215,6 @@ class Journal {
   Status count_start();
   Status visit_recorded(const Digest& job, const std::function<Status(const Completion&)>& visit);
   Status visit_archived(const Digest& job, const std::function<Status(const Completion&)>& visit);
-  Result<std::vector<Digest>> read_digests(SqlStatement& query) const;
   Result<std::vector<FrameStats>> stats_of(const Digest& job, TaskKind kind, std::int32_t position);
   Result<SqlStatement*> read(std::string_view sql);
   Result<SqlStatement*> write(std::string_view sql);

@@ -53,7 +53,9 @@ Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes
 
 Status Journal::restart_job(const Digest& job) {
   for (const char* const sql :
-       {"DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
+       {"INSERT OR IGNORE INTO former_renderers SELECT job, renderer FROM renderers WHERE job = ?",
+        "INSERT OR IGNORE INTO former_renderers SELECT job, '' FROM mixed_jobs WHERE job = ?",
+        "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM failures WHERE job = ?",
         "DELETE FROM completions WHERE job = ?", "DELETE FROM frame_files WHERE job = ?",
         "DELETE FROM renderers WHERE job = ?", "DELETE FROM mixed_jobs WHERE job = ?",
@@ -184,7 +186,7 @@ Result<bool> Journal::is_kept(const Digest& blob) {
 Result<std::vector<Digest>> Journal::kept_blobs(const Digest& job) {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT blob FROM kept_blobs WHERE job = ?"));
   query.bind(job);
-  return read_digests(query);
+  return query.digests();
 }
 
 Result<std::uint64_t> Journal::kept_bytes() {

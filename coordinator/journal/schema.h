@@ -72,7 +72,8 @@ inline constexpr const char* kSchema = R"sql(
 /// Tables that a journal of this version may lack: it gets them when it is opened, and an earlier
 /// program leaves them alone. `frame_files` says how a frame's file stood when it had this digest,
 /// `output_marks` of which open jobs the output folder is marked; store_token has one row, or none.
-/// `renderers`: by what the tasks of a job were done that are done, the last ones of `mixed_jobs`.
+/// `renderers`: by what the tasks of a job were done that are done, the last ones of `mixed_jobs`;
+/// `former_renderers`: by what those that are forgotten, empty where they were mixed.
 /// Where other tables say `job`, they mean the digest of a document: a version. `versions` says of
 /// which job (JobId) it is the n-th, `identities` when what happened to that job, `locked_frames`
 /// which of its frames count as done whatever is in their files, `priorities` which priority a
@@ -92,6 +93,8 @@ inline constexpr const char* kLaterTables = R"sql(
   CREATE TABLE IF NOT EXISTS store_token (token TEXT NOT NULL);
   CREATE TABLE IF NOT EXISTS renderers (job TEXT PRIMARY KEY, renderer TEXT NOT NULL) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS mixed_jobs (job TEXT PRIMARY KEY) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS former_renderers (
+    job TEXT NOT NULL, renderer TEXT NOT NULL, PRIMARY KEY (job, renderer)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS versions (
     document TEXT PRIMARY KEY, id TEXT NOT NULL, number INTEGER NOT NULL,
     UNIQUE (id, number)) WITHOUT ROWID;

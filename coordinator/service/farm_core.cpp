@@ -363,9 +363,6 @@ Result<std::string> FarmCore::mark_output(const Digest& job) {
   if (open == nullptr || !is_open(open->status)) return std::string();
   const fs::path file = output_token_file(open->spec.output.directory, job, token);
   const std::string frames = format_frames(locked(job, open->spec).numbers(open->spec));
-  if (!frames.empty())
-    BATON_TRY(tell_locks_again(journal, open->spec, history.jobs(), history.jobs().of(job).id,
-                               options.roots));
   const Result<std::string> there = read_after_token(file, token);
   if (marked_.contains(job) && (lost_mark(job, open->spec) || (there && *there == frames)))
     return token;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <span>
 
 #include "common/base/patiently.h"
 #include "common/job/plan/sequence.h"
@@ -19,7 +18,7 @@ namespace fs = std::filesystem;
 Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& folder,
                                         const Digest& version, const JobId& id) {
   FolderRecord record;
-  record.jobs_.push_back(version);
+  BATON_ASSIGN(record.jobs_[version], journal.renderers(version));
   if (auto locks = patiently([&] { return locks_of_others(folder, id.hex()); }))
     record.locked_ = std::move(*locks);
   BATON_ASSIGN(const auto given_up, journal.given_up(id));
@@ -30,7 +29,7 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& fol
     Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
     if (!document) continue;
     document->job.output.directory = folder;
-    record.jobs_.push_back(other);
+    BATON_ASSIGN(record.jobs_[other], journal.renderers(other));
     BATON_TRY(journal.for_each_completion(other, [&](const Completion& done) -> Status {
       if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
       const fs::path path = frame_path(document->job, done.task.frame());
@@ -49,25 +48,30 @@ std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
   return recorded;
 }
 
-bool FolderRecord::may_replace(const fs::path& path, const FileVerdict& picture) const {
+bool FolderRecord::is_recorded(const fs::path& path, const FileVerdict& picture) const {
   if (is_locked(path)) return false;
   const auto given_up = given_up_.find(path);
   if (given_up != given_up_.end() && given_up->second == picture.digest) return true;
-  const auto found = images_.find(path);
-  const std::span<const Image> images =
-      found == images_.end() ? std::span<const Image>() : std::span(found->second);
-  if (std::ranges::any_of(images,
-                          [&](const Image& image) { return image.image.digest == picture.digest; }))
-    return true;
-  const auto writer =
-      std::ranges::find_if(jobs_, [&](const Digest& job) { return job.hex() == picture.writer; });
-  return writer != jobs_.end() &&
-         std::ranges::none_of(images, [&](const Image& image) { return image.job == *writer; });
+  const std::vector<BlobRef> images = images_of(path);
+  return std::ranges::find(images, picture.digest, &BlobRef::digest) != images.end();
+}
+
+bool FolderRecord::may_be_unreported(const fs::path& path, const FileVerdict& picture) const {
+  const auto writer = std::ranges::find_if(
+      jobs_, [&](const auto& job) { return picture.writer.starts_with(job.first.hex()); });
+  if (writer == jobs_.end() || is_locked(path)) return false;
+  const auto& [job, renderers] = *writer;
+  const bool is_by_us = renderers.empty() || std::ranges::any_of(renderers, [&](const auto& known) {
+                          return picture.writer.ends_with(known);
+                        });
+  const auto images = images_.find(path);
+  return is_by_us && (images == images_.end() ||
+                      std::ranges::find(images->second, job, &Image::job) == images->second.end());
 }
 
 bool FolderRecord::is_foreign(const FileVerdict& picture) const {
-  return !picture.writer.empty() && std::ranges::none_of(jobs_, [&](const Digest& job) {
-    return job.hex() == picture.writer;
+  return !picture.writer.empty() && std::ranges::none_of(jobs_, [&](const auto& job) {
+    return picture.writer.starts_with(job.first.hex());
   });
 }
 
@@ -89,7 +93,7 @@ void FolderRecord::give_up(const fs::path& path, const Digest& picture) {
 }
 
 OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& spec,
-                          const LockedFrames& locked) {
+                          const LockedFrames& locked, bool restart) {
   OddFrames odd;
   BlobRef nothing;
   nothing.kind = BlobKind::image;
@@ -116,7 +120,8 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
       odd.unread.push_back(std::move(file));
     } else if (verdict.state == FileState::unreadable) {
       odd.unreadable = verdict.fault;
-    } else if (verdict.state == FileState::strange && !record.may_replace(path, verdict)) {
+    } else if (verdict.state == FileState::strange &&
+               !(restart ? record.is_recorded(path, verdict) : record.may_replace(path, verdict))) {
       odd.doubt.strange.push_back(
           {path.string(), number, verdict.digest, record.is_foreign(verdict)});
     }

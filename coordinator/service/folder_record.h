@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,9 +28,14 @@ class FolderRecord {
   /// What the file of a frame may be, as far as it is recorded.
   std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
   /// Whether a picture in the place of a frame may be replaced: a person has given it up, or it is
-  /// a job's of this folder, one that is recorded, or one that was written and never reported. None
-  /// that another job has locked (common/store/frame_locks.h), none while that cannot be read.
-  bool may_replace(const std::filesystem::path& path, const FileVerdict& picture) const;
+  /// a job's of this folder, one that is recorded, or one that was written and never reported: by
+  /// what the job is rendered with here, or it is another coordinator's. None that another job has
+  /// locked (common/store/frame_locks.h), none while that cannot be read.
+  bool may_replace(const std::filesystem::path& path, const FileVerdict& picture) const {
+    return is_recorded(path, picture) || may_be_unreported(path, picture);
+  }
+  /// The same without those that were never reported.
+  bool is_recorded(const std::filesystem::path& path, const FileVerdict& picture) const;
   /// Whether a picture is as a job wrote it that is none of this folder's.
   bool is_foreign(const FileVerdict& picture) const;
   /// Those of which only the digest must be known for that: at most kMostTold, the newest of them.
@@ -45,12 +51,14 @@ class FolderRecord {
     return !locked_ || locked_->contains(path.filename().string());
   }
 
+  bool may_be_unreported(const std::filesystem::path& path, const FileVerdict& picture) const;
+
   static constexpr std::size_t kMostTold = 256;
   std::map<std::filesystem::path, std::vector<Image>> images_;
   std::map<std::filesystem::path, Digest> given_up_;
   /// By others, by name; nullopt: that cannot be read.
   std::optional<std::map<std::string, std::string>> locked_;
-  std::vector<Digest> jobs_;
+  std::map<Digest, std::set<std::string>> jobs_;  ///< with Journal::renderers
 };
 
 /// Frames of which only a person can say what becomes of them.
@@ -79,7 +87,8 @@ struct OddFrames {
 };
 /// For people: what is wrong with them; empty: nothing.
 std::string fault_text(const OddFrames& odd, const JobId& job);
+/// restart: all that is not recorded is in doubt.
 OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& spec,
-                          const LockedFrames& locked);
+                          const LockedFrames& locked, bool restart = false);
 
 }  // namespace baton

@@ -78,15 +78,29 @@ std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNu
   return files;
 }
 
+namespace {
+
+/// Under the names that they have in any of these versions.
+Result<std::set<std::string>> files_of_versions(Journal& journal,
+                                                const std::vector<Digest>& versions,
+                                                const std::vector<FrameNumber>& frames) {
+  std::set<std::string> files;
+  if (frames.empty()) return files;
+  for (const Digest& version : versions) {
+    BATON_ASSIGN(const std::optional<std::string> text, journal.document(version));
+    const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+    if (document) files.merge(frame_files(document->job, frames));
+  }
+  return files;
+}
+
+}  // namespace
+
 Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Digest>& versions,
                   const JobId& id, const std::vector<FrameNumber>& locked, const Roots& roots) {
   if (!check_output_root(spec, roots)) return {};
-  std::set<std::string> files = frame_files(spec, locked);
-  for (const Digest& version : locked.empty() ? std::vector<Digest>() : versions) {
-    BATON_ASSIGN(const std::optional<std::string> text, journal.document(version));
-    const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
-    if (document) files.merge(frame_files(document->job, locked));
-  }
+  BATON_ASSIGN(std::set<std::string> files, files_of_versions(journal, versions, locked));
+  files.merge(frame_files(spec, locked));
   BATON_TRY(record_locks(spec.output.directory, id.hex(), files));
   // The folder's name may lead elsewhere tomorrow.
   const std::string today = resolve_folder(spec.output.directory);
@@ -109,18 +123,21 @@ Status tell_locks_again(Journal& journal, const JobSpec& spec, const IdentityBoo
   return {};
 }
 
-void drop_stale_locks(const JobSpec& spec, const IdentityBook& jobs) {
+Status drop_stale_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs) {
   const auto locks = locks_of_others(spec.output.directory, {});
-  if (!locks) return;
-  std::set<JobId> stale;
-  for (const auto& [file, job] : *locks) {
+  if (!locks) return {};
+  std::set<std::string> ids;
+  for (const auto& [file, job] : *locks) ids.insert(job);
+  for (const std::string& job : ids) {
     const std::optional<JobId> id = JobId::from_hex(job);
-    if (id && !jobs.versions(*id).empty() && jobs.locked(*id).empty()) stale.insert(*id);
-  }
-  for (const JobId& job : stale) {
-    if (const Status dropped = retain_locks(spec.output.directory, job.hex(), {}); !dropped)
+    const std::vector<Digest> versions = id ? jobs.versions(*id) : std::vector<Digest>();
+    if (versions.empty()) continue;
+    BATON_ASSIGN(const std::set<std::string> files,
+                 files_of_versions(journal, versions, jobs.locked(*id)));
+    if (const Status dropped = retain_locks(spec.output.directory, job, files); !dropped)
       spdlog::warn("locks stay for other coordinators: {}", dropped.error().message);
   }
+  return {};
 }
 
 Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,
@@ -143,8 +160,7 @@ Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, co
     const std::optional<JobId> other = JobId::from_hex(lock->second);
     if (!other || jobs.versions(*other).empty()) {
       strange.push_back(frame);
-    } else if (!jobs.locked(*other).empty()) {
-      // It may be under another name that the folder had.
+    } else {  // under another name that the folder had
       known[*other].push_back(frame);
     }
   }

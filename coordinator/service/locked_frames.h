@@ -51,9 +51,9 @@ Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Diges
 /// learn of it before it is said again. Errors: the journal's.
 Status tell_locks_again(Journal& journal, const JobSpec& spec, const IdentityBook& jobs,
                         const JobId& id, const Roots& roots);
-/// Takes locks of jobs that are known, and have none any more, off the job's output folder: it may
-/// have had another name when they were put there.
-void drop_stale_locks(const JobSpec& spec, const IdentityBook& jobs);
+/// Takes what jobs that are known have unlocked off the job's output folder: it may have been away
+/// then, or have had another name when they were locked. Errors: the journal's.
+Status drop_stale_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs);
 /// Why a job is refused that would replace frames that are locked in another one. other_name:
 /// short, of that job.
 Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,

@@ -209,7 +209,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   if (const Status folder = expect_folder(document->job.output.directory); !folder)
     return farm_.refuse(peer, folder.error());
   BATON_ASSIGN(const JobId id, submission.known_job(*document));
-  drop_stale_locks(document->job, farm_.history.jobs());
+  BATON_TRY(drop_stale_locks(farm_.journal, document->job, farm_.history.jobs()));
   if (!farm_.history.jobs().locked(id).empty()) {
     BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
                                farm_.options.roots));
@@ -245,7 +245,9 @@ Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const
   if (waits_->join(job, incoming, now)) return std::optional<OddFrames>();
   BATON_ASSIGN(const FolderRecord record,
                FolderRecord::read(farm_.journal, spec.output.directory, job, version.id));
-  OddFrames odd = find_odd_frames(record, files_, spec, locked);
+  const auto* const submitted = std::get_if<SubmitJob>(&message);
+  OddFrames odd = find_odd_frames(record, files_, spec, locked,
+                                  /*restart=*/submitted != nullptr && submitted->restart);
   if (odd.unread.empty()) return std::optional(std::move(odd));
   const std::string text = fmt::format("job '{}': looking at {} frames in {}", spec.name,
                                        odd.unread.size(), spec.output.directory);
@@ -355,8 +357,10 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
   if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
-  BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
-                             farm_.options.roots));
+  if (message.off) {
+    BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
+                               farm_.options.roots));
+  }
   // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
   // stand now.
   if (is_away) return answer_detail(peer, *job);

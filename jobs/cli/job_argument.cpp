@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "common/base/bytes.h"
-#include "common/base/files.h"
 #include "common/scene/settle/settle_motion.h"
 
 namespace baton {
@@ -87,26 +85,6 @@ Result<WantedJob> load_wanted(const JobArgument& argument, bool look) {
   WantedJob wanted{std::move(job), (look || changed) && !own_folder};
   if (wanted.is_look) wanted.job.output.directory += "-look";
   return wanted;
-}
-
-Status claim_look_folder(const std::filesystem::path& folder, bool may_replace) {
-  const std::filesystem::path mark = folder / ".baton-look";
-  std::error_code error;
-  if (std::filesystem::exists(mark, error)) return {};
-  std::filesystem::create_directories(folder, error);
-  bool is_empty = true;  // but for what Baton has put there for its work
-  std::filesystem::directory_iterator files(folder, error);
-  for (; !error && files != std::filesystem::directory_iterator(); files.increment(error))
-    is_empty = is_empty && files->path().filename().string().starts_with(".baton");
-  if (error) return Error{ErrorKind::io, fmt::format("{}: {}", folder.string(), error.message())};
-  if (!is_empty && !may_replace) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: a look would replace what is in it, and no look has made that\n"
-                             "--restart replaces it, --set output.directory=DIR keeps it",
-                             folder.string())};
-  }
-  return write_file_atomic(
-      mark, as_bytes_view("frames of looks: the next one may replace whatever is here\n"));
 }
 
 void add_from_frame_option(CLI::App& command, std::optional<FrameNumber>& frame) {

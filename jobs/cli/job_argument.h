@@ -1,7 +1,6 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,11 +36,6 @@ struct WantedJob {
   /// name), in which a later look of a frame replaces it.
   bool is_look = false;
 };
-/// Makes the folder of a look, or sees that it is one, so that whatever is in it may be replaced.
-/// may_replace: it becomes one whatever is in it. Errors: bad_input, files are in it and no look
-/// has made it; io.
-Status claim_look_folder(const std::filesystem::path& folder, bool may_replace);
-
 /// Reads the file. `look`: a look even if the options change nothing. Errors: load_job's.
 Result<WantedJob> load_wanted(const JobArgument& argument, bool look = false);
 

@@ -127,6 +127,26 @@ def what_is_kept_is_by_one(programs, folder):
         check_equal(programs.pixels(place / "frames"), expected, f"pixels, {name}")
 
 
+def frames_of_another_coordinators_set_stay(programs, folder):
+    """The same document, rendered there with another instruction set: only --restart replaces them."""
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    path = make(folder)
+    programs.render(path, folder / "first", extra=("--isa", sets[-1]))
+    theirs = programs.pixels(folder / "frames")
+    refused = programs.render(path, folder / "second", extra=("--isa", sets[0]), expect=IO)
+    check_says(refused.stderr, "frame.0001.exr", "are not what a job has written here", "--restart")
+    check_equal(programs.pixels(folder / "frames"), theirs, "frames of the other one")
+    programs.render(path, folder / "third", extra=("--isa", sets[-1]))
+    check_equal(programs.pixels(folder / "frames"), theirs, "frames of a third one with the same set")
+    for work in ("second", "fourth"):
+        programs.render(path, folder / work, extra=("--isa", sets[0], "--restart"))
+        check(all(theirs[name] != pixels for name, pixels in programs.pixels(folder / "frames").items()), f"--restart, {work}")
+        programs.render(path, folder / "third", extra=("--isa", sets[-1], "--restart"))
+        check_equal(programs.pixels(folder / "frames"), theirs, "frames of the third one anew")
+
+
 def with_mixed_builds_a_frame_is_by_one(programs, folder):
     """Two machines that are not alike: who began goes on while it is there; then the other makes the frames that are not
     done, whole, and their headers name it."""

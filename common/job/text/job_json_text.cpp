@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "common/base/legible.h"
 #include "common/base/limits.h"
 
 namespace baton {
@@ -17,11 +18,10 @@ using nlohmann::json;
 /// Bytes of a message, of which a token is a part.
 constexpr std::size_t kMostShown = 300;
 
-/// The first `size` bytes, or fewer, so that no character is cut.
-std::string_view beginning_of(std::string_view text, std::size_t size) {
-  while (size > 0 && size < text.size() && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80)
-    --size;
-  return text.substr(0, size);
+/// A text of anybody's as a message may have it.
+std::string shown_part(const std::string& text) {
+  return text.size() <= kMostShown ? legible_line(text)
+                                   : legible_line(text.substr(0, kMostShown)) + "...";
 }
 
 /// The parser's message without its own prefixes: "line 3, column 7: syntax error ...".
@@ -30,8 +30,7 @@ std::string plain_message(std::string message) {
     const std::size_t at = message.find(prefix);
     if (at != std::string::npos) message.erase(0, at + prefix.size());
   }
-  if (message.size() <= kMostShown) return message;
-  return fmt::format("{}...", beginning_of(message, kMostShown));
+  return shown_part(message);
 }
 
 /// Follows the parser through a document for what it lets pass, keys given twice and deep nesting,
@@ -120,7 +119,7 @@ Result<json> parse_json_text(std::string_view text, const std::string& name) {
 
 std::string json_path_key(const std::string& path, std::string_view key) {
   if (key.size() > limits::kMaxTextLength)
-    return fmt::format("{}[\"{}...\"]", path, beginning_of(key, kMostShown));
+    return fmt::format("{}[\"{}\"]", path, shown_part(std::string(key)));
   const bool plain = !key.empty() && std::all_of(key.begin(), key.end(), [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c >= 0x80;
   });

@@ -29,7 +29,6 @@ using nlohmann::ordered_json;
 
 constexpr std::chrono::milliseconds kPollInterval{500};
 constexpr std::chrono::minutes kWaitPatience{5};
-constexpr char kAway[] = "away", kPaused[] = "paused";  // among what was told
 
 struct JobOptions {
   CoordinatorLink link;
@@ -110,8 +109,11 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   const Clock::time_point start = Clock::now();
   std::optional<Clock::time_point> last_answer;
   std::string job = options.job;  // once it is found, its ID: others may take its name
-  std::set<std::string> told;     // what it waits for now, each once: two faults may alternate
-  std::size_t num_grown = 0;      // decisions that were printed
+  std::set<std::string> told;     // lines, each once: two faults may alternate
+  const auto say = [&](const std::string& line) {
+    if (told.insert(line).second) fmt::print(stderr, "{}\n", line);
+  };
+  std::size_t num_grown = 0;  // decisions that were printed
   for (;;) {
     const Result<ShownJob> answer = ask<ShownJob>(client, ShowJob{job});
     const std::chrono::duration<double> waited = Clock::now() - start;
@@ -119,9 +121,8 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
       const bool away = answer.error().kind == ErrorKind::timeout && last_answer &&
                         Clock::now() - *last_answer < kWaitPatience;
       if (!away) return answer.error();
-      if (told.insert(kAway).second)
-        fmt::print(stderr, "the coordinator does not answer: waits {} minutes for it\n",
-                   kWaitPatience.count());
+      say(fmt::format("the coordinator does not answer: waits {} minutes for it",
+                      kWaitPatience.count()));
       if (options.timeout_s > 0 && waited.count() >= options.timeout_s) return ExitCode::timeout;
       std::this_thread::sleep_for(kPollInterval);
       continue;
@@ -141,11 +142,11 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
     }
     const bool is_paused = detail.summary.status == JobStatus::paused;
     if (detail.waits.empty() && !is_paused) told.clear();
-    if (!detail.waits.empty() && told.insert(detail.waits).second)
-      fmt::print(stderr, "waits for {}\n", detail.waits);
-    if (detail.waits.empty() && is_paused && told.insert(kPaused).second)
-      fmt::print(stderr, "is paused: `baton job resume {}` goes on\n",
-                 answer->identity.id.short_hex());
+    if (!detail.waits.empty()) {
+      say("waits for " + detail.waits);
+    } else if (is_paused) {
+      say(fmt::format("is paused: `baton job resume {}` goes on", answer->identity.id.short_hex()));
+    }
     std::this_thread::sleep_for(kPollInterval);
   }
 }

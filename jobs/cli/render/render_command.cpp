@@ -6,6 +6,7 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/render/look_folder.h"
 #include "jobs/cli/render/render_watch.h"
 #include "jobs/cli/settle_method.h"
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/scene/settle/settle_motion.h"
+#include "jobs/cli/render/look_folder.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {

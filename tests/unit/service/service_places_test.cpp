@@ -132,12 +132,23 @@ TEST_F(PlaceTest, WhatAFormerJobHasLeftMayGo) {
   worker.hello();
   put(2, picture);
   const LeaseId lease = wait_for_frame_2(worker);
-  say_taken(worker, lease, former.hex());
+  say_taken(worker, lease, former.hex() + " TEST, " + build_identity());
   const LeaseId again = wait_for_frame_2(worker);
   EXPECT_NE(again, lease);
   EXPECT_THAT(granted, ElementsAre(digest_of(picture)));
   worker.say(worker.work(again));
   EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+}
+
+// Of the same document, as another coordinator has it rendered.
+TEST_F(PlaceTest, WhatAnotherRendererMadeStays) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  put(2, picture);
+  say_taken(worker, wait_for_frame_2(worker), id.hex() + " OTHER, " + build_identity());
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::failed);
 }
 
 }  // namespace
