@@ -3,13 +3,14 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <optional>
 
 #include "common/base/check.h"
-#include "common/base/file_descriptor.h"
 
 namespace baton {
 namespace {
@@ -140,10 +141,18 @@ Result<SqlDatabase> SqlDatabase::open(const std::filesystem::path& path) {
   BATON_TRY(database.execute("PRAGMA journal_mode = WAL"));
   BATON_TRY(database.execute("PRAGMA synchronous = FULL"));
 
+  database.file_ = FileDescriptor(::open(path.c_str(), O_PATH | O_CLOEXEC));
   return database;
 }
 
-void SqlDatabase::reserve_room() const {
+Status SqlDatabase::expect_named() const {
+  struct stat file {};
+  if (::fstat(file_.number(), &file) != 0 || file.st_nlink > 0) return {};
+  return Error{ErrorKind::io, name_ + ": was deleted or replaced while it was open"};
+}
+
+void SqlDatabase::reserve_room() {
+  if (has_asked_for_room_) return;
   constexpr std::uint64_t kMostBytes = std::uint64_t{16} << 20, kShareOfDisk = 40;
   const std::string log = name_ + "-wal";
   FileDescriptor file(::open(log.c_str(), O_WRONLY | O_CLOEXEC));
@@ -151,9 +160,11 @@ void SqlDatabase::reserve_room() const {
   if (!file || ::fstatvfs(file.number(), &disk) != 0) return;
   const std::uint64_t bytes =
       std::min(kMostBytes, std::uint64_t{disk.f_blocks} * disk.f_frsize / kShareOfDisk);
-  // The log's end stays where it is: what lies behind it is nobody's data. What is taken already is
-  // not taken twice.
-  ::fallocate(file.number(), FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(bytes));
+  // The log's end stays where it is: what lies behind it is nobody's data. The log is never cut
+  // while the database is open, so what is taken stays.
+  has_asked_for_room_ =
+      ::fallocate(file.number(), FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(bytes)) == 0 ||
+      (errno != ENOSPC && errno != EDQUOT && errno != EINTR);
 }
 
 Status SqlDatabase::check(std::string_view table) {

@@ -11,6 +11,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
+#include "common/base/file_descriptor.h"
 #include "common/base/result.h"
 
 struct sqlite3;
@@ -76,10 +77,14 @@ class SqlDatabase {
   /// Opens or creates the file, write-ahead logged; a commit survives a power cut.
   static Result<SqlDatabase> open(const std::filesystem::path& path);
 
+  /// ErrorKind::io once the file's last name is gone, or another file has it: what is written to it
+  /// then nobody will read.
+  Status expect_named() const;
+
   /// Takes room on the disk for what is committed next, 16 MiB or a fortieth of a smaller disk, so
-  /// that commits go on for a while on one that others have filled. Where the disk has none, or
-  /// does not promise any, nothing happens.
-  void reserve_room() const;
+  /// that commits go on for a while on one that others have filled. Once it is taken, or where the
+  /// disk promises none, nothing happens; where the disk is full now, the next call tries again.
+  void reserve_room();
 
   /// Reads a table whole to see that its pages are sound.
   Status check(std::string_view table);
@@ -98,6 +103,8 @@ class SqlDatabase {
 
   std::unique_ptr<sqlite3, Close> database_;
   std::string name_;
+  FileDescriptor file_{-1};          ///< a path's: closing it drops none of SQLite's locks
+  bool has_asked_for_room_ = false;  ///< and was answered for good
 };
 
 }  // namespace baton

@@ -380,7 +380,7 @@ Status Journal::commit() {
   in_transaction_ = false;
   BATON_TRY(database_.execute("COMMIT"));
   database_.reserve_room();
-  return {};
+  return database_.expect_named();
 }
 
 }  // namespace baton

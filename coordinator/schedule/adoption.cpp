@@ -33,14 +33,22 @@ class KeptFrames {
     }
   }
 
-  void collect(const FormerJob& former, const FrameComparison& comparison) {
-    if (!writes_alike(former.document.job, wanted_.job)) return;
+  /// place: of the former job among all, in their order.
+  void collect(const FormerJob& former, std::size_t place, const FrameComparison& comparison) {
+    const bool is_alike = writes_alike(former.document.job, wanted_.job);
     for (const Completions::Task& task : former.tasks) {
       if (task.task.kind != TaskKind::assemble || task.outputs.size() != 1) continue;
       const FrameIndex old = task.task.frame();
       const auto found = index_.find(former.document.job.frames.at(old.index()));
       if (found == index_.end()) continue;
       const FrameIndex frame = found->second;
+      if (!is_alike) {
+        if (files_.has_frame(frame, task.outputs.front())) {
+          overwritten_.insert(frame);
+          overwrites_ = place;
+        }
+        continue;
+      }
       if (has(frame)) {
         add_stats(former, old, task.outputs.front().digest, *frames_[frame.index()]);
         continue;
@@ -58,6 +66,7 @@ class KeptFrames {
       if (is_there) {
         frames_[frame.index()] = Completion{assemble_task(frame), {{image}}};
         add_stats(former, old, image.digest, *frames_[frame.index()]);
+        kept_of_ = place;
       }
       if (!is_there) lost_.insert(frame);
 
@@ -98,8 +107,11 @@ class KeptFrames {
     adoption.other_plates = other_plates_;
     adoption.plan.others_frames.assign(others_.begin(), others_.end());
     for (const FrameIndex frame : lost_) {
-      if (!has(frame)) adoption.lost.push_back(frame);
+      if (has(frame)) continue;
+      adoption.lost.push_back(frame);
+      if (overwritten_.contains(frame)) adoption.overwritten.insert(frame);
     }
+    adoption.beside = overwrites_ ? overwrites_ : kept_of_;
   }
 
  private:
@@ -118,7 +130,8 @@ class KeptFrames {
   const KeptFiles& files_;
   std::map<FrameNumber, FrameIndex> index_;
   std::vector<std::optional<Completion>> frames_;
-  std::set<FrameIndex> lost_, others_;
+  std::set<FrameIndex> lost_, others_, overwritten_;
+  std::optional<std::size_t> overwrites_, kept_of_;  ///< former jobs
   bool other_plates_ = false;
 };
 
@@ -310,7 +323,7 @@ Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& fo
   std::vector<Predecessor> predecessors;
   for (const FormerJob& former : formers) {
     const FrameComparison comparison(former.document, wanted);
-    kept.collect(former, comparison);
+    kept.collect(former, predecessors.size(), comparison);
     predecessors.emplace_back(wanted, former, comparison);
   }
   kept.add_locked();

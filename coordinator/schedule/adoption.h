@@ -48,6 +48,10 @@ struct Adoption {
   bool other_plates = false;
   /// Frames that were written and are not there.
   std::vector<FrameIndex> lost;
+  /// Those of them in whose place a former job has written another way.
+  std::set<FrameIndex> overwritten;
+  /// The newest former job that has, or else whose frames are kept.
+  std::optional<std::size_t> beside;
 
   bool empty() const { return frames.empty() && tasks.empty() && plan.cuts.empty(); }
 };

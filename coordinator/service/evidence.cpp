@@ -31,6 +31,17 @@ std::vector<BlobRef> leased_inputs(const FarmCore& farm, const LeaseId& lease) {
   return inputs;
 }
 
+/// Why nothing can be written into a folder, or into the one where it would be made; nullopt: it
+/// can.
+std::optional<std::string> find_closed_folder(fs::path folder) {
+  std::error_code error;
+  while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
+  if (fs::exists(folder, error) && !fs::is_directory(folder, error))
+    return "a folder in the place of " + folder.string();
+  if (::access(folder.c_str(), R_OK | W_OK | X_OK) == 0) return std::nullopt;
+  return "a folder that can be written: " + folder.string();
+}
+
 }  // namespace
 
 std::optional<Digest> find_missing_blob(const FarmCore& farm, const TaskDone& report) {
@@ -68,9 +79,16 @@ std::optional<std::string> find_hindrance(const FarmCore& farm, const LeaseId& l
     return "a frame's place: " + stamp.error().message;
   if (is_frame && ::access(frame.c_str(), R_OK) != 0 && errno != ENOENT && errno != ENOTDIR)
     return "a frame's place: what is in " + frame.string() + " cannot be read";
-  while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
-  if (::access(folder.c_str(), W_OK) == 0 || errno != EROFS) return std::nullopt;
-  return "a folder that can be written";
+  if (const auto closed = find_closed_folder(folder)) return closed;
+  // The store's blobs lie one folder deeper.
+  if (is_frame) return std::nullopt;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code gone;
+    if (!entry->is_directory(gone)) continue;
+    if (const auto closed = find_closed_folder(entry->path())) return closed;
+  }
+  return std::nullopt;
 }
 
 std::optional<std::vector<BlobRef>> find_bad_inputs(const FarmCore& farm, FileTable& files,

@@ -302,7 +302,8 @@ Result<FolderRecord*> FarmCore::record_of(const Digest& job, const JobSpec& spec
   const auto known = records_.find(job);
   if (known != records_.end()) return &known->second;
   BATON_ASSIGN(FolderRecord record,
-               FolderRecord::read(journal, spec.output.directory, job, history.jobs().of(job).id));
+               FolderRecord::read(journal, history.jobs(), spec.output.directory, job,
+                                  history.jobs().of(job).id));
   return &records_.emplace(job, std::move(record)).first->second;
 }
 

@@ -15,16 +15,17 @@ namespace baton {
 
 namespace fs = std::filesystem;
 
-Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& folder,
-                                        const Digest& version, const JobId& id) {
+Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jobs,
+                                        const std::string& folder, const Digest& version,
+                                        const JobId& id) {
   FolderRecord record;
   BATON_ASSIGN(record.jobs_[version], journal.renderers(version));
   if (auto locks = patiently([&] { return locks_of_others(folder, id.hex()); }))
     record.locked_ = std::move(*locks);
   BATON_ASSIGN(const auto given_up, journal.given_up(id));
   for (const auto& [file, picture] : given_up) record.given_up_[fs::path(folder) / file] = picture;
-  BATON_ASSIGN(const std::vector<Digest> jobs, jobs_in_folder(journal, folder));
-  for (const Digest& other : jobs) {
+  BATON_ASSIGN(const std::vector<Digest> neighbours, jobs_in_folder(journal, folder));
+  for (const Digest& other : neighbours) {
     BATON_ASSIGN(const std::optional<std::string> text, journal.document(other));
     Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
     if (!document) continue;
@@ -37,14 +38,34 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const std::string& fol
       return {};
     }));
   }
+  record.mark_superseded(jobs.versions(id), version);
   return record;
+}
+
+void FolderRecord::mark_superseded(const std::vector<Digest>& versions, const Digest& version) {
+  const auto age = [&](const Image& image) {
+    return std::ranges::find(versions, image.job) - versions.begin();
+  };
+  const auto is_of_job = [&](const Image& image) {
+    return age(image) < std::ssize(versions) && !image.image.is_placeholder();
+  };
+  for (auto& [path, images] : images_) {
+    std::ptrdiff_t newest = -1;
+    for (const Image& image : images) {
+      if (is_of_job(image)) newest = std::max(newest, age(image));
+    }
+    for (Image& image : images)
+      image.is_superseded = is_of_job(image) && age(image) < newest && image.job != version;
+  }
 }
 
 std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
   std::vector<BlobRef> recorded;
   const auto found = images_.find(path);
   if (found == images_.end()) return recorded;
-  for (const Image& image : found->second) recorded.push_back(image.image);
+  for (const Image& image : found->second) {
+    if (!image.is_superseded) recorded.push_back(image.image);
+  }
   return recorded;
 }
 

@@ -12,18 +12,21 @@
 #include "coordinator/journal/journal.h"
 #include "coordinator/service/file_reader.h"
 #include "coordinator/service/file_table.h"
+#include "coordinator/service/identity_book.h"
 #include "coordinator/service/locked_frames.h"
 
 namespace baton {
 
 /// What the journal has of the frames in a job's folder, by whichever job wrote them there. Paths
-/// are those of the job (frame_path()).
+/// are those of the job (frame_path()). Where several versions of one job have written a frame, it
+/// is the newest's: who puts an older one's back has replaced it.
 class FolderRecord {
  public:
-  /// version: the digest of the job's document, which the journal may not have yet. id: whose
-  /// pictures that were given up are meant; empty: nobody's.
-  static Result<FolderRecord> read(Journal& journal, const std::string& folder,
-                                   const Digest& version, const JobId& id);
+  /// version: the digest of the job's document, which the journal may not have yet; what it has
+  /// written counts in any case. id: the job; empty: it is new.
+  static Result<FolderRecord> read(Journal& journal, const IdentityBook& jobs,
+                                   const std::string& folder, const Digest& version,
+                                   const JobId& id);
 
   /// What the file of a frame may be, as far as it is recorded.
   std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
@@ -46,11 +49,13 @@ class FolderRecord {
   struct Image {
     Digest job;
     BlobRef image;
+    bool is_superseded = false;  ///< a newer version of the job has written its own there
   };
   bool is_locked(const std::filesystem::path& path) const {
     return !locked_ || locked_->contains(path.filename().string());
   }
 
+  void mark_superseded(const std::vector<Digest>& versions, const Digest& version);
   bool may_be_unreported(const std::filesystem::path& path, const FileVerdict& picture) const;
 
   static constexpr std::size_t kMostTold = 256;

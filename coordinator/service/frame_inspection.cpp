@@ -42,7 +42,7 @@ std::vector<FileToRead> files_to_inspect(const Scheduler::Job& job, const FileTa
 Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
                                        const std::vector<FileContent>& contents,
                                        const LockedFrames& locked, Journal& journal,
-                                       const JobId& id) {
+                                       const IdentityBook& jobs, const Digest& version) {
   std::map<fs::path, const FileContent*> read;
   for (const FileContent& content : contents) read[content.path] = &content;
 
@@ -80,8 +80,9 @@ Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
   if (pictures.empty()) return found;
 
   // A worker of a former job may have written late.
-  BATON_ASSIGN(const FolderRecord record,
-               FolderRecord::read(journal, job.spec.output.directory, {}, id));
+  BATON_ASSIGN(
+      const FolderRecord record,
+      FolderRecord::read(journal, jobs, job.spec.output.directory, {}, jobs.of(version).id));
   for (const auto& [path, picture] : pictures) {
     if (record.may_replace(path, picture.second)) {
       lose(picture.first, path);

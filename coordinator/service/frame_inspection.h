@@ -30,11 +30,11 @@ struct InspectedFrames {
     return lost.empty() && doubt.empty() && unreadable.empty() && !is_stale;
   }
 };
-/// contents: of files_to_inspect(), maybe of an earlier day of the job. id: the job's. Errors: the
-/// journal's.
+/// contents: of files_to_inspect(), maybe of an earlier day of the job. version: the job's. Errors:
+/// the journal's.
 Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
                                        const std::vector<FileContent>& contents,
                                        const LockedFrames& locked, Journal& journal,
-                                       const JobId& id);
+                                       const IdentityBook& jobs, const Digest& version);
 
 }  // namespace baton

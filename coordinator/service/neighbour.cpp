@@ -60,7 +60,7 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
                   const FileTable& files, const std::vector<FrameNumber>* owned,
                   const Locks& locks) {
   const JobStatus status = former.status;
-  Neighbour other{job, status, {}, {}, {}, false};
+  Neighbour other{.job = job, .status = status};
   const JobSpec& theirs = former.document.job;
   const auto shared = shared_frames(theirs, wanted.job);
   std::map<FrameIndex, BlobRef> images;
@@ -75,13 +75,16 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
   std::set<std::string> differing;
   for (const auto& [mine, its] : shared) {
     if (locks.theirs.contains(mine)) other.locked.push_back(theirs.frames[mine.index()]);
-    if (locks.mine.contains(its)) continue;
     const auto image = images.find(mine);
     const bool is_owned =
         owned == nullptr ||
         std::find(owned->begin(), owned->end(), theirs.frames[mine.index()]) != owned->end();
-    const bool is_there = is_owned && image != images.end() &&
-                          files.is_right(frame_path(theirs, mine), image->second);
+    const FileState state = is_owned && image != images.end()
+                                ? files.judge(frame_path(theirs, mine), image->second).state
+                                : FileState::absent;
+    const bool is_there = state == FileState::right;
+    other.has_place = other.has_place || is_open(status) || state != FileState::absent;
+    if (locks.mine.contains(its)) continue;
     if (!is_there && !is_open(status)) continue;
     other.written.push_back(wanted.job.frames[its.index()]);
     differing.insert(picture.begin(), picture.end());

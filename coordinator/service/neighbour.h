@@ -15,10 +15,12 @@ struct Neighbour {
   Digest job;
   JobStatus status = JobStatus::running;
   /// Frames in common that it has written; all of them if it is open.
-  std::vector<FrameNumber> written;
+  std::vector<FrameNumber> written = {};
   /// What makes their pixels others; empty: they are the same.
-  std::vector<std::string> differing;
-  std::optional<FrameNumber> first_differing;
+  std::vector<std::string> differing = {};
+  std::optional<FrameNumber> first_differing = {};
+  /// They have frames in common, and it is open, or something is in the place of one that it wrote.
+  bool has_place = false;
   /// It is open, and no frame says whose picture it is.
   bool busy = false;
   /// Frames that it has not written and the new one does not have.

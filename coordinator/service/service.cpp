@@ -152,6 +152,7 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
                                                                farm_.peers.num_workers())});
   }
   if (const auto lack = is_new ? lack_of_descriptors() : std::nullopt) {
+    farm_.peers.turn_away(hello, "the farm is full: " + *lack, Clock::now());
     tell("workers are refused: " + *lack);
     return farm_.refuse(peer, {ErrorKind::timeout, "the farm is full: " + *lack});
   }

@@ -93,7 +93,7 @@ Status Service::end_inspection(const FilesRead& read) {
   if (job == nullptr || job->status != JobStatus::running) return {};
   BATON_ASSIGN(const InspectedFrames found,
                inspect_frames(*job, read.contents, farm_.locked(digest, job->spec), farm_.journal,
-                              farm_.history.jobs().of(digest).id));
+                              farm_.history.jobs(), digest));
   // What changes while it is read, or cannot be read now, may stand otherwise in a moment.
   if (found.is_stale || (!found.unreadable.empty() && may_pass(digest))) {
     farm_.to_inspect.emplace(digest, std::chrono::steady_clock::now() + kInspectAgain);

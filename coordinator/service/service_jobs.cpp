@@ -115,7 +115,7 @@ Status Service::restore_job(const Digest& digest) {
   event.spec.priority =
       farm_.history.jobs().priority(farm_.history.jobs().of(digest).id, event.spec.priority);
   event.plan = std::move(known.plan);
-  event.renderer = std::move(known.renderer);
+  event.renderer = held_to(known.renderer, known.is_mixed, farm_.options.mixed_builds);
   event.is_mixed = known.is_mixed;
 
   // An open job needs every file that it counts on. What cannot be looked at now is not gone: the
@@ -244,7 +244,8 @@ Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const
   const Digest& job = version.document;
   if (waits_->join(job, incoming, now)) return std::optional<OddFrames>();
   BATON_ASSIGN(const FolderRecord record,
-               FolderRecord::read(farm_.journal, spec.output.directory, job, version.id));
+               FolderRecord::read(farm_.journal, farm_.history.jobs(), spec.output.directory, job,
+                                  version.id));
   const auto* const submitted = std::get_if<SubmitJob>(&message);
   OddFrames odd = find_odd_frames(record, files_, spec, locked,
                                   /*restart=*/submitted != nullptr && submitted->restart);
@@ -364,6 +365,11 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
   // stand now.
   if (is_away) return answer_detail(peer, *job);
+  if (message.off && !is_open_now && fault.empty()) {
+    // Behind a lock a frame may be of another picture.
+    const Status room = Submission(farm_, files_, speaker_).expect_room(*document);
+    if (!room) fault = room.error().message;
+  }
   BATON_ASSIGN(const bool ends_again, farm_.ended_by_frames(*job, fault, message.off));
   if (ends_again && fault.empty())
     BATON_TRY(

@@ -74,6 +74,12 @@ Result<JobId> Submission::known_job(const ParsedJobDocument& document) {
   return same == namesakes.rend() ? JobId() : known.of(*same).id;
 }
 
+Status Submission::expect_room(const ParsedJobDocument& document) {
+  BATON_ASSIGN(const JobId id, known_job(document));
+  const Result<std::vector<Neighbour>> others = find_neighbours(document, id, false);
+  return others ? Status() : Status(others.error());
+}
+
 /// What stands in the way of a new version of `job`: a folder has one open job, and a frame in it
 /// belongs to the job that wrote it. Errors (bad_input, usage): jobs of another picture whose
 /// frames would be replaced, without `restart`; another job that is open.
@@ -92,8 +98,6 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
                       LockedFrames(document.job, farm_.history.jobs().locked(job))};
     Neighbour other =
         look_at(former, digest, document, files_, ended ? &ended->frames_done : nullptr, locks);
-    if (!other.locked.empty())
-      return locked_elsewhere(document.job, other.locked, farm_.history.name_of(digest));
     if (other.busy && !restart && !is_former_version) {
       return Error{
           ErrorKind::bad_input,
@@ -102,12 +106,15 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
                       document.job.name, farm_.history.name_of(digest), former.document.job.name,
                       job_status_name(other.status), document.job.output.directory)};
     }
+    const Status own = farm_.check_own(speaker_, digest);
+    if (!own && (other.has_place || other.busy))
+      return Error{ErrorKind::usage, own.error().message + "; another output.directory keeps it"};
+    if (!other.locked.empty())
+      return locked_elsewhere(document.job, other.locked, farm_.history.name_of(digest));
     if (!other.differing.empty() && !restart)
       return another_picture(document.job, other, former.document.job,
                              farm_.history.name_of(digest));
     if (other.written.empty() && !other.busy) continue;
-    if (is_open(other.status) || !other.differing.empty())
-      BATON_TRY(farm_.check_own(speaker_, digest));
     others.push_back(std::move(other));
   }
   return others;
@@ -328,7 +335,8 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
     if (!(former.document.picture == document.picture)) continue;
     const bool is_other =
         !farm_.options.mixed_builds && !former.renderer.empty() && former.renderer != newest;
-    if (is_other || (restart && farm_.scheduler.leases().nobody_renders_as(former.renderer))) {
+    const std::string held = held_to(former.renderer, former.is_mixed, farm_.options.mixed_builds);
+    if (is_other || (restart && farm_.scheduler.leases().nobody_renders_as(held))) {
       reasons.push_back("nothing is kept that was rendered with " + former.renderer);
       continue;
     }
@@ -348,20 +356,27 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   heritage.adoption = adopt(document, formers, kept);
   const Adoption& adoption = heritage.adoption;
   if (!formers.empty()) {
+    const FormerJob& beside = formers[adoption.beside.value_or(formers.size() - 1)];
     for (std::string& reason :
-         output_reasons(formers.back().document.job, document.job, adoption.other_plates))
+         output_reasons(beside.document.job, document.job, adoption.other_plates))
       reasons.push_back(std::move(reason));
   }
   constexpr std::size_t kMost = 8;
-  for (std::size_t i = 0; i < adoption.lost.size() && i < kMost; ++i) {
+  std::size_t num_gone = 0;
+  for (const FrameIndex frame : adoption.lost) {
+    if (adoption.overwritten.contains(frame) || ++num_gone > kMost) continue;
     reasons.push_back(fmt::format("{} is gone, or not as it was last written",
-                                  frame_path(document.job, adoption.lost[i]).string()));
+                                  frame_path(document.job, frame).string()));
   }
-  if (adoption.lost.size() > kMost)
-    reasons.push_back(fmt::format("and {} frames more", adoption.lost.size() - kMost));
+  if (num_gone > kMost) reasons.push_back(fmt::format("and {} frames more", num_gone - kMost));
+  // Locked frames are of no renderer: nobody reads or writes them.
+  const bool has_rendered =
+      !formers.empty() && std::ranges::any_of(adoption.frames, [&](const Completion& frame) {
+        return !locked.contains(frame.task.frame());
+      });
   if (adoption.former) {
     heritage.renderer = formers[*adoption.former].renderer;
-  } else if (!adoption.frames.empty() && !farm_.options.mixed_builds) {
+  } else if (has_rendered && !farm_.options.mixed_builds) {
     heritage.renderer = newest;
   }
   heritage.is_mixed = (heritage.is_mixed || renderers.size() > 1) && !adoption.empty();
@@ -405,10 +420,10 @@ Status Submission::take_over(const Heritage& heritage, const std::string& text, 
         farm_.journal.add_job(event.job, text, {event.spec.name, event.spec.output.directory}));
   }
   BATON_TRY(farm_.journal.record_plan(event.job, adoption.plan));
-  event.renderer = heritage.renderer;
+  event.renderer = held_to(heritage.renderer, heritage.is_mixed, farm_.options.mixed_builds);
   event.is_mixed = heritage.is_mixed;
-  if (!event.renderer.empty() || event.is_mixed)
-    BATON_TRY(farm_.journal.record_renderer(event.job, event.renderer, event.is_mixed));
+  if (!heritage.renderer.empty() || heritage.is_mixed)
+    BATON_TRY(farm_.journal.record_renderer(event.job, heritage.renderer, heritage.is_mixed));
   if (!speaker_.name.empty() && !farm_.owners.contains(event.job)) {
     farm_.owners[event.job] = speaker_.name;
     BATON_TRY(farm_.journal.record_owner(event.job, speaker_.name));

@@ -28,6 +28,9 @@ class Submission {
   /// pictures of others in their places; there are some only where message.restart gives them up.
   Status submit(const PeerId& peer, const ParsedJobDocument& document, const SubmitJob& message,
                 const std::vector<FramesInDoubt::Frame>& strange);
+  /// Errors (bad_input, usage): why the document would be refused without --restart beside the jobs
+  /// of its folder.
+  Status expect_room(const ParsedJobDocument& document);
   /// The job that the document is a version of, or becomes one; empty: a new one.
   Result<JobId> known_job(const ParsedJobDocument& document);
   /// A document of a job that may grow gets the sweeps that jobs of its picture have written in its

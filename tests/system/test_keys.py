@@ -47,8 +47,8 @@ class KeyedFarm(Farm):
         check(says in answer.stderr and len(answer.stderr.strip().splitlines()) == 1, f"{words}: {answer.stderr}")
 
 
-def small(folder, **changes):
-    return write_job(folder / "job.json", make_job(folder, frames="1-2", image={"tileSize": 80}, **changes))
+def small(folder, frames="1-2", **changes):
+    return write_job(folder / "job.json", make_job(folder, frames=frames, image={"tileSize": 80}, **changes))
 
 
 def roles_decide_who_may_do_what(programs, folder):
@@ -68,6 +68,12 @@ def roles_decide_who_may_do_what(programs, folder):
         farm.refused("anna", "job", "delete", job, says="user 'anna' may not change it")
         farm.refused("anna", "job", "submit", small(folder / "job", seed=8), "--restart",
                      says="user 'anna' may not change it")
+        # Nor do other settings of the same picture, in place of its frames or beside them.
+        frames = lambda: {file.name: file.read_bytes() for file in (folder / "job/frames").glob("*.exr")}
+        before = frames()
+        for changes in ({"output": {"aovs": ["depth"]}}, {"name": "mine", "output": {"pixelType": "float"}}, {"frames": "1-3"}):
+            farm.refused("anna", "job", "submit", small(folder / "job", **changes), says="belongs to 'user'")
+        check(frames() == before, "frames of another user are others")
         farm.refused("anna", "job", "set", job, "priority=1", says="user 'anna' may not change it")
         farm.refused("user", "farm", "stop", "--yes", says="user 'user' may not stop the farm")
         check_says(farm.speak("anna", "job", "why", job).stdout, "the job is done")

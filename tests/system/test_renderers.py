@@ -182,7 +182,7 @@ def with_mixed_builds_a_frame_is_by_one(programs, folder):
 
 
 def what_unlike_renderers_made_is_not_compared(programs, folder):
-    """Not after the farm has stopped to mix them, either: nobody is at fault."""
+    """Nobody is at fault. Once the farm has stopped to mix them, nobody goes on with it, and it is said how."""
     sets = sets_of(programs)
     if len(sets) < 2:
         return
@@ -195,12 +195,19 @@ def what_unlike_renderers_made_is_not_compared(programs, folder):
         first.kill()
         farm.start_worker(extra=("--isa", sets[0]))
         farm.wait_for(ident)
-        farm.coordinator.kill()
-        farm.start_coordinator()
-        (folder / "frames/frame.0001.exr").unlink()
-        farm.submit(path)
+        for mixes in (True, False):
+            farm.coordinator.kill()
+            farm.start_coordinator(extra=("--mixed-builds",) if mixes else ())
+            wait_until(lambda: "joined" in farm.coordinator.log(), "the worker is back")
+            (folder / "frames/frame.0001.exr").unlink()
+            farm.submit(path)
+            if mixes:
+                farm.wait_for(ident)
+                check("different bytes" not in farm.coordinator.log(), "they were compared")
+        check_says(farm.show(ident)["waits"], "with several builds or instruction sets", "--mixed-builds goes on", "--restart", "--from-frame")
+        farm.baton("job", "submit", path, "--restart")
         farm.wait_for(ident)
-        check("different bytes" not in farm.coordinator.log(), "they were compared")
+    check_equal(len({renderer_of(frame) for frame in (folder / "frames").glob("*.exr")}), 1, "renderers of the frames")
 
 
 def the_one_command_says_so(programs, folder):
@@ -227,6 +234,26 @@ def the_one_command_says_so(programs, folder):
     programs.render(make(witness, sampling={"numCandidates": 512, "numDistributions": 48}), witness / "work",
                     extra=("--isa", sets[0]))
     check_equal(programs.pixels(folder / "frames"), programs.pixels(witness / "frames"), "pixels")
+
+
+def a_locked_frame_holds_a_job_to_no_renderer(programs, folder):
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    with Farm(programs, folder / "farm") as farm:
+        worker = farm.start_worker(extra=("--isa", sets[-1]))
+        ident = farm.submit(make(folder))
+        farm.wait_for(ident)
+        farm.baton("job", "lock", ident, "--frames", "3")
+        locked = (folder / "frames/frame.0003.exr").read_bytes()
+        worker.terminate()
+        worker.wait()
+        farm.start_worker(extra=("--isa", sets[0]))
+        wait_until(lambda: farm.coordinator.log().count("joined") == 2, "it is there")
+        check_says(farm.baton("job", "submit", folder / "job.json", "--restart").stderr, "nothing is kept that was rendered with")
+        farm.wait_for(ident)
+        check_equal((folder / "frames/frame.0003.exr").read_bytes(), locked, "the locked frame")
+        check(renderer_of(folder / "frames/frame.0001.exr") != renderer_of(folder / "frames/frame.0003.exr"), "frame 1 is of before")
 
 
 def a_set_that_is_not_there_is_said(programs, folder):

@@ -19,6 +19,7 @@ int next_sweeps(const QualitySpec& quality, float noise, double seconds, int tim
   const int most = quality.max_rounds > 0 ? quality.max_rounds : limits::kMaxRounds;
   next = std::min<std::int64_t>(next, most / quality.rounds);
   if (quality.time_limit && timed > 0) {
+    if (seconds < 0) return sweeps;
     const double room = double{*quality.time_limit} - seconds;
     const double a_sweep = std::max(seconds / timed, 1e-6);
     next = std::min(next, sweeps + static_cast<std::int64_t>(std::floor(room / a_sweep)));

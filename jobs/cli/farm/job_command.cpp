@@ -240,21 +240,31 @@ Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
       if (!is_open(job.summary.status)) jobs.push_back(job.identity.id.hex());
     }
   }
-  // Of all that have ended, those of others stay.
-  std::size_t num_others = 0;
+  // Of all that have ended, those of others stay, and those whose locks would go with them.
+  std::size_t num_deleted = 0, num_others = 0, num_locked = 0;
   for (const std::string& job : jobs) {
-    const Result<JobList> deleted = ask<JobList>(client, DeleteJob{job});
+    BATON_ASSIGN(const ShownJob shown, ask<ShownJob>(client, ShowJob{job}));
+    if (options.all_ended && !shown.locked.empty()) {
+      ++num_locked;
+      continue;
+    }
+    const Result<JobList> deleted = ask<JobList>(client, DeleteJob{shown.identity.id.hex()});
     const bool is_others = !deleted && deleted.error().kind == ErrorKind::usage;
     if (!deleted && !(is_others && options.all_ended)) return deleted.error();
-    num_others += is_others ? 1 : 0;
+    ++(is_others ? num_others : num_deleted);
+    if (!shown.locked.empty())
+      fmt::print(stderr, "frames {} are not locked any more\n", format_frames(shown.locked));
   }
-  const std::size_t num_deleted = jobs.size() - num_others;
   if (options.json) {
-    fmt::print("{}\n", json_text({{"deleted", num_deleted}, {"others", num_others}}, 2));
+    fmt::print(
+        "{}\n",
+        json_text({{"deleted", num_deleted}, {"others", num_others}, {"locked", num_locked}}, 2));
     return ExitCode::ok;
   }
   fmt::print("{} jobs are deleted; their frames stay\n", num_deleted);
   if (num_others > 0) fmt::print("{} jobs of others stay\n", num_others);
+  if (num_locked > 0)
+    fmt::print("{} jobs with locked frames stay: each is deleted by its ID\n", num_locked);
   return ExitCode::ok;
 }
 

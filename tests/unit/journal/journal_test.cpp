@@ -185,6 +185,30 @@ TEST_F(JournalTest, ASecondCoordinatorIsTurnedAway) {
               HasSubstr("journal.sqlite: already in use by another coordinator"));
 }
 
+// What it would hold from then on nobody would read.
+TEST_F(JournalTest, OneThatIsDeletedOrReplacedWhileItIsOpenTakesNothingMore) {
+  for (const bool is_replaced : {false, true}) {
+    Journal journal = open();
+    ASSERT_TRUE(journal.add_job(digest_of(is_replaced ? "b" : "a"), "{}").ok());
+    ASSERT_TRUE(journal.commit().ok());
+    fs::rename(path, folder / "elsewhere");  // still there, and so is what it takes
+    ASSERT_TRUE(journal.add_job(digest_of(is_replaced ? "d" : "c"), "{}").ok());
+    EXPECT_TRUE(journal.commit().ok());
+    if (is_replaced) {
+      std::ofstream(folder / "other") << "other";
+      fs::rename(folder / "other", folder / "elsewhere");
+    } else {
+      fs::remove(folder / "elsewhere");
+    }
+    ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+    const Status committed = journal.commit();
+    ASSERT_FALSE(committed.ok());
+    EXPECT_THAT(committed.error().message,
+                HasSubstr("journal.sqlite: was deleted or replaced while it was open"));
+    for (const auto& file : fs::directory_iterator(folder)) fs::remove(file);
+  }
+}
+
 // One that was killed a moment ago still has the lock.
 TEST_F(JournalTest, ACoordinatorOnItsWayOutIsWaitedFor) {
   auto first = std::make_unique<Journal>(open());
