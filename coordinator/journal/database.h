@@ -103,7 +103,8 @@ class SqlDatabase {
 
   std::unique_ptr<sqlite3, Close> database_;
   std::string name_;
-  FileDescriptor file_{-1};          ///< a path's: closing it drops none of SQLite's locks
+  /// A path's: closing it drops none of SQLite's locks.
+  FileDescriptor file_{-1};
   bool has_asked_for_room_ = false;  ///< and was answered for good
 };
 

@@ -88,10 +88,11 @@ struct JobAdded {
   std::vector<TaskKey> lost = {};
   /// Blobs that are gone and that nobody needs now (BlobLedger::spare_blobs).
   std::vector<BlobRef> lost_spares = {};
-  JobPlan plan = {};          ///< its leading runs stand in `spec`, too
-  std::string renderer = {};  ///< of what is done of it (held_to); empty: not known
-  bool is_mixed = false;      ///< others have made some of it, too
-  std::string waits = {};     ///< for what, where it is paused
+  JobPlan plan = {};  ///< its leading runs stand in `spec`, too
+  /// Of what is done of it (held_to); empty: not known.
+  std::string renderer = {};
+  bool is_mixed = false;   ///< others have made some of it, too
+  std::string waits = {};  ///< for what, where it is paused
 };
 /// The renderer that may go on with what one has made, alone or not (is_mixed); nobody, where it
 /// was not alone and may_take_over is not set.

@@ -49,7 +49,8 @@ class FolderRecord {
   struct Image {
     Digest job;
     BlobRef image;
-    bool is_superseded = false;  ///< a newer version of the job has written its own there
+    /// A newer version of the job has written its own there.
+    bool is_superseded = false;
   };
   bool is_locked(const std::filesystem::path& path) const {
     return !locked_ || locked_->contains(path.filename().string());

@@ -71,6 +71,14 @@ def no_more_is_rendered_than_is_asked_for(programs, folder):
     programs.refuses("compare", *paths, "--frame", "2", says="compare: no option --frame; did you mean \"--frames\"?", expect=USAGE)
 
 
+def a_comparison_replaces_comparisons_only(programs, folder):
+    paths = pair(folder)
+    programs.render(paths[0], folder / "work")
+    frames = programs.pixels(folder / "one")
+    programs.refuses("compare", *paths, "--frames", "2", "--output", folder, says=["/one: what is in it would be replaced", "another --output keeps it"])
+    check_equal(programs.pixels(folder / "one"), frames, "frames of a job")
+
+
 def jobs_that_cannot_be_compared_are_told_apart(programs, folder):
     for key, value in [("frames", "1-4"), ("name", "one")]:
         paths = pair(folder / key, **{key: value})

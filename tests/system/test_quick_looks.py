@@ -2,11 +2,12 @@
 
 import json
 import re
+import shutil
 import subprocess
 
 from assets import write_map
 from exr_frames import read_frame
-from farm import BAD_INPUT, OK, USAGE, Process, check, check_equal, run_tests, wait_until
+from farm import BAD_INPUT, OK, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
 from png_files import read_png, srgb
 
@@ -48,11 +49,23 @@ def test_a_look_replaces_looks_only(programs, folder):
     programs.render(job_at(other, seed=3, output={"directory": str(folder / "frames-look")}), other / "work")
     theirs = programs.pixels(folder / "frames-look")
     look = ("render", job, "--work-dir", folder / "work", "--frames", "2", "--scale", ".5")
-    programs.refuses(*look, says=["frames-look", "no look has made that", "--restart", "--set output.directory"])
+    programs.refuses(*look, says=["frames-look", "no look or comparison has made that", "--restart", "--set output.directory"])
     check_equal(programs.pixels(folder / "frames-look"), theirs, "frames of another job")
     programs.run("baton", *look, "--restart", expect=OK)
     programs.run("baton", *look[:-1], ".25", expect=OK)
     check_equal(read_frame(folder / "frames-look/frame.0002.exr").width, 40, "width of the last look")
+
+    # A job whose frames the next look would replace goes elsewhere; what is handed in is a look likewise.
+    says = ["frames-look", "another output.directory keeps them"]
+    programs.refuses("render", other / "job.json", "--work-dir", other / "work", says=says)
+    shutil.rmtree(folder / "frames-look")
+    programs.render(other / "job.json", other / "again")
+    with Farm(programs, folder / "farm") as farm:
+        submit = ("job", "submit", job, "--frames", "2")
+        check_says(farm.baton(*submit, expect=BAD_INPUT).stderr, "no look or comparison has made that", "--restart")
+        check_equal(programs.pixels(folder / "frames-look"), theirs, "frames of another job, beside a farm")
+        farm.baton(*submit, "--restart")
+        check_says(farm.baton("job", "submit", other / "job.json", expect=BAD_INPUT).stderr, *says)
 
 
 def test_the_sheet_has_numbers_and_one_exposure(programs, folder):

@@ -235,6 +235,12 @@ def the_one_command_says_so(programs, folder):
                     extra=("--isa", sets[0]))
     check_equal(programs.pixels(folder / "frames"), programs.pixels(witness / "frames"), "pixels")
 
+    # What is done is begun again as well.
+    said = programs.run("baton", *command, sets[-1], "--restart")
+    check_says(said.stderr, "nothing is kept that was rendered with")
+    makers = {renderer_of(frame) for frame in (folder / "frames").glob("*.exr")}
+    check(makers == {renderer_of(folder / "frames/frame.0001.exr")} != {renderer_of(witness / "frames/frame.0001.exr")}, f"renderers {makers}")
+
 
 def a_locked_frame_holds_a_job_to_no_renderer(programs, folder):
     sets = sets_of(programs)

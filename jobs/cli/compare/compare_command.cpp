@@ -16,6 +16,7 @@
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_argument.h"
+#include "jobs/cli/look_folder.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
 #include "jobs/study/as_shown.h"
@@ -231,6 +232,9 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
     jobs.push_back(std::move(compared));
   }
   BATON_TRY(check_alike(jobs, options));
+
+  for (const Compared& compared : jobs)
+    BATON_TRY(claim_look_folder(compared.job.output.directory, "another --output keeps it"));
 
   // Render all of them, and with their other seeds.
   std::vector<JobSpec> all;

@@ -19,6 +19,7 @@
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/look_folder.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -65,6 +66,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   // A pilot takes its time: first see that there is somebody to submit to.
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
   BATON_TRY(settle_method_at(job, options.link));
+  BATON_TRY(claim_output(wanted, options.restart));
   const bool restart = options.restart || options.from_frame || wanted.is_look;
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,

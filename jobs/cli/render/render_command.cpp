@@ -6,7 +6,7 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/render/look_folder.h"
+#include "jobs/cli/look_folder.h"
 #include "jobs/cli/render/render_watch.h"
 #include "jobs/cli/settle_method.h"
 
@@ -25,10 +25,8 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   JobSpec& job = wanted.job;
   BATON_TRY(begin_at(job, options.from_frame));
   BATON_TRY(check_out(options, job));
-  if (wanted.is_look) {
-    BATON_TRY(claim_look_folder(job.output.directory, options.restart));
-    spdlog::info("a look: frames go to {}", job.output.directory);
-  }
+  BATON_TRY(claim_output(wanted, options.restart));
+  if (wanted.is_look) spdlog::info("a look: frames go to {}", job.output.directory);
   const FarmOptions farm = farm_options(options, job);
   BATON_TRY(settle_method(job, farm));
 

@@ -128,10 +128,26 @@ Result<std::optional<ShownJob>> RenderSession::follow(const JobSpec& spec, const
   }
 }
 
+/// Waits until a worker is there, not for long: who does not come is told of while the job runs.
+Status RenderSession::await_worker() {
+  constexpr std::chrono::seconds kPatience{20};
+  constexpr std::chrono::milliseconds kInterval{20};  // a worker is there in a tenth of a second
+  const Clock::time_point end = Clock::now() + kPatience;
+  while (Clock::now() < end) {
+    BATON_ASSIGN(const std::optional<JobList> list,
+                 ask_farm<JobList>(farm_, client_, signals_, ListJobs{}));
+    if (!list || !list->workers.empty() || signals_.stop_requested_within(kInterval)) return {};
+    BATON_TRY(farm_.tend());
+  }
+  return {};
+}
+
 /// Submits the job and follows it to its end.
 Result<std::optional<ShownJob>> RenderSession::render_document(
     const JobSpec& job, bool restart, FrameSheet& sheet, const std::function<bool()>& interrupted) {
   BATON_ASSIGN(const std::string document, make_job_document(job));
+  // What --restart begins again depends on who renders.
+  if (restart && farm_.is_own()) BATON_TRY(await_worker());
   for (;;) {
     BATON_ASSIGN(const std::optional<JobAccepted> accepted,
                  ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{document, restart}));

@@ -66,6 +66,7 @@ class RenderSession {
   void stop() { farm_.stop(); }
 
  private:
+  Status await_worker();
   Result<std::optional<ShownJob>> render_document(const JobSpec& job, bool restart,
                                                   class FrameSheet& sheet,
                                                   const std::function<bool()>& interrupted);

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "common/scene/settle/settle_motion.h"
-#include "jobs/cli/render/look_folder.h"
+#include "jobs/cli/look_folder.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -73,7 +73,7 @@ Result<ExitCode> watch_and_render(const RenderOptions& options) {
     Result<WantedJob> version = load_settled(options.job, true);
     Status outcome = version ? check_out(options, version->job) : Status(version.error());
     if (outcome.ok()) outcome = settle_method(version->job, farm);
-    if (outcome.ok()) outcome = claim_look_folder(version->job.output.directory, options.restart);
+    if (outcome.ok()) outcome = claim_output(*version, options.restart);
     if (outcome.ok()) {
       spdlog::info("a look: frames go to {}", version->job.output.directory);
       const auto rendered = render_twice(session, version->job, interrupted);
