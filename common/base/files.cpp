@@ -114,7 +114,7 @@ namespace {
 class NewFile {
  public:
   /// Creates missing folders.
-  static Result<NewFile> create(const fs::path& path) {
+  static Result<NewFile> create(const fs::path& path, mode_t rights = 0644) {
     std::error_code error;
     if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
     if (error) {
@@ -129,7 +129,7 @@ class NewFile {
       const std::string name = fmt::format(".{}.{:08x}{:08x}.tmp", path.filename().string(),
                                            std::uint32_t{random()}, std::uint32_t{random()});
       FileDescriptor file(::openat(held.number(), name.c_str(),
-                                   O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+                                   O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, rights));
       if (file) return NewFile(path, name, std::move(held), std::move(file));
       if (errno != EEXIST || attempt == 100) return io_error("cannot create", folder / name);
     }
@@ -236,8 +236,8 @@ Result<bool> write_file_verified(
   return true;
 }
 
-Status write_file_unsynced(const fs::path& path, ByteView bytes) {
-  BATON_ASSIGN(NewFile file, NewFile::create(path));
+Status write_file_unsynced(const fs::path& path, ByteView bytes, mode_t rights) {
+  BATON_ASSIGN(NewFile file, NewFile::create(path, rights));
   BATON_TRY(file.write(bytes));
   return file.publish();
 }

@@ -42,8 +42,9 @@ Result<bool> write_file_verified(
 Status expect_content(const std::filesystem::path& path, ByteView bytes);
 
 /// Publishes as write_file_atomic does, without waiting for the disk: other processes see the file
-/// whole or not at all, but only sync_file_system() makes it survive a power cut.
-Status write_file_unsynced(const std::filesystem::path& path, ByteView bytes);
+/// whole or not at all, but only sync_file_system() makes it survive a power cut. rights: of the
+/// file, before the process's mask.
+Status write_file_unsynced(const std::filesystem::path& path, ByteView bytes, mode_t rights = 0644);
 
 /// Error no_space: writing so much to the file system of `folder` would leave less than a reserve,
 /// at most a twentieth of it.

@@ -94,6 +94,8 @@ inline constexpr int kMaxTasksPerJob = 4000000;
 inline constexpr int kMaxTaskAttempts = 16;
 inline constexpr int kMaxTaskLosses = 16;  ///< lost leases of a task that pause its job
 inline constexpr int kMaxSecondsPerTask = 30 * 24 * 3600;
+/// That a worker takes for a job's files before a task of it begins.
+inline constexpr int kMaxSecondsToLoad = 900;
 inline constexpr int kMaxLeasesPerWorker = 1024;
 inline constexpr int kMaxPriority = 100;  ///< of a job
 inline constexpr int kMaxJobs = 10000;

@@ -341,6 +341,8 @@ struct OutputSpec {
   double frames_per_second = 24;
   FrameNaming naming = FrameNaming::plain;
   bool clamp_negative = true;  ///< colours below zero become 0 in frames
+  /// Frames only to look at: those of a later look take their places.
+  bool is_look = false;
 
   bool operator==(const OutputSpec&) const = default;
 };

@@ -21,8 +21,12 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kReconnectFirstMs = 50;
 constexpr int kReconnectMaxMs = 2000;
-constexpr int kTransportHeartbeatMs = 2000;  // notices a peer whose machine vanished
-constexpr int kTransportTimeoutMs = 6000;
+// Who connects to a coordinator says within this who it is, or goes.
+constexpr int kHandshakeMs = 10000;
+// A peer whose machine has vanished is noticed after 5 + 3 * 2 s, and after kUnansweredMs where
+// something was sent to it.
+constexpr int kKeepAliveIdleS = 5, kKeepAliveIntervalS = 2, kKeepAliveProbes = 3;
+constexpr int kUnansweredMs = 12000;
 constexpr std::chrono::milliseconds kClosingInterval{100};
 
 void set_options(zmq::socket_t& socket, std::chrono::milliseconds linger) {
@@ -32,8 +36,13 @@ void set_options(zmq::socket_t& socket, std::chrono::milliseconds linger) {
   socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(limits::kMaxMessageBytes));
   socket.set(zmq::sockopt::reconnect_ivl, kReconnectFirstMs);
   socket.set(zmq::sockopt::reconnect_ivl_max, kReconnectMaxMs);
-  socket.set(zmq::sockopt::heartbeat_ivl, kTransportHeartbeatMs);
-  socket.set(zmq::sockopt::heartbeat_timeout, kTransportTimeoutMs);
+  // The system's, not ZeroMQ's heartbeats: those end the process with an assertion where a peer
+  // leaves with its queue unread (libzmq 4.3.4).
+  socket.set(zmq::sockopt::tcp_keepalive, 1);
+  socket.set(zmq::sockopt::tcp_keepalive_idle, kKeepAliveIdleS);
+  socket.set(zmq::sockopt::tcp_keepalive_intvl, kKeepAliveIntervalS);
+  socket.set(zmq::sockopt::tcp_keepalive_cnt, kKeepAliveProbes);
+  socket.set(zmq::sockopt::tcp_maxrt, kUnansweredMs);
 }
 
 /// Repeats a call that a signal interrupted.
@@ -155,6 +164,7 @@ Result<Socket> Socket::open(const std::string& endpoint, std::chrono::millisecon
     impl->socket.set(zmq::sockopt::immediate, unconnected == Unconnected::refuse);
     if (listen) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
+      impl->socket.set(zmq::sockopt::handshake_ivl, kHandshakeMs);
       impl->socket.bind(endpoint);
       impl->endpoint = impl->socket.get(zmq::sockopt::last_endpoint);
     } else {

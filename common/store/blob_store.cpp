@@ -11,6 +11,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
+/// All workers of a farm are of one account.
+constexpr mode_t kOwnersOnly = 0600;
+
 /// The files below a folder, of this extension, that nobody has written to for kLeftoverAge. What
 /// cannot be read is left out.
 std::vector<fs::path> old_files(const fs::path& folder, const char* extension) {
@@ -59,7 +62,7 @@ Result<Digest> BlobStore::put(ByteView bytes) {
   std::error_code error;
   if (fs::is_directory(path(digest), error)) BATON_TRY(remove(digest));
   BATON_TRY(expect_space(directory_, bytes.size(), limits::kStoreReserveBytes));
-  BATON_TRY(write_file_unsynced(path(digest), bytes));
+  BATON_TRY(write_file_unsynced(path(digest), bytes, kOwnersOnly));
   return digest;
 }
 

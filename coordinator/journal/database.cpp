@@ -127,6 +127,8 @@ ByteView SqlStatement::blob(int column) const {
 void SqlDatabase::Close::operator()(sqlite3* database) const { sqlite3_close(database); }
 
 Result<SqlDatabase> SqlDatabase::open(const std::filesystem::path& path) {
+  // SQLite gives its log the rights of the file.
+  { const FileDescriptor made(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600)); }
   sqlite3* handle = nullptr;
   const int code =
       sqlite3_open_v2(path.c_str(), &handle, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);

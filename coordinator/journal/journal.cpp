@@ -224,10 +224,8 @@ Result<std::vector<FrameFile>> Journal::frame_files(const Digest& job) {
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return files;
-    // Without a digest that can be read the frame is one of which nothing is known.
-    const std::optional<Digest> digest = Digest::from_hex(query.text(1));
-    if (!digest) continue;
-    files.push_back({FrameIndex(static_cast<std::int32_t>(query.integer(0))), *digest,
+    const Digest digest = Digest::from_hex(query.text(1)).value_or(Digest());
+    files.push_back({FrameIndex(static_cast<std::int32_t>(query.integer(0))), digest,
                      FileStamp{.size_bytes = static_cast<std::uint64_t>(query.integer(2)),
                                .inode = static_cast<std::uint64_t>(query.integer(3)),
                                .time_ns = query.integer(4)}});
@@ -348,13 +346,18 @@ Result<std::set<std::string>> Journal::renderers(const Digest& job) {
   return std::set<std::string>(renderers.begin(), renderers.end());
 }
 
-Status Journal::record_frame_file(const Digest& job, const FrameFile& file) {
+Status Journal::record_frame_file(const Digest& job, FrameIndex frame,
+                                  const std::optional<FrameFile>& file) {
+  if (!file) {
+    return change("DELETE FROM frame_files WHERE job = ? AND frame = ?", job,
+                  std::int64_t{frame.value()});
+  }
   return change(
       "INSERT OR REPLACE INTO frame_files (job, frame, digest, size_bytes, inode, time_ns) "
       "VALUES (?, ?, ?, ?, ?, ?)",
-      job, std::int64_t{file.frame.value()}, file.digest,
-      static_cast<std::int64_t>(file.stamp.size_bytes), static_cast<std::int64_t>(file.stamp.inode),
-      file.stamp.time_ns);
+      job, std::int64_t{frame.value()}, file->digest,
+      static_cast<std::int64_t>(file->stamp.size_bytes),
+      static_cast<std::int64_t>(file->stamp.inode), file->stamp.time_ns);
 }
 
 Status Journal::record_output_mark(const Digest& job, const std::optional<std::string>& folder) {

@@ -33,6 +33,7 @@ struct JournalledJob {
 /// How the file of a finished frame stood when its bytes had this digest.
 struct FrameFile {
   FrameIndex frame{};
+  /// Digest(): a worker may have written it, and nothing else is known.
   Digest digest;
   FileStamp stamp;
 };
@@ -106,7 +107,7 @@ class Journal {
   Result<std::vector<FrameStats>> run_stats(const Digest& job, Run run);
   /// What was seen of a frame when it was put together; nullopt: it is not, or nothing was told.
   Result<std::optional<FrameStats>> frame_stats(const Digest& job, FrameIndex frame);
-  /// How frames of a job that is not in the archive stand, as far as it is known.
+  /// How frames of a job stand, as far as it is known; all of which an assembly was granted.
   Result<std::vector<FrameFile>> frame_files(const Digest& job);
   /// By which workers know the store; nullopt: not recorded.
   Result<std::optional<std::string>> store_token();
@@ -136,7 +137,9 @@ class Journal {
   /// By what this coordinator has had a document rendered, also before it began again; an empty one
   /// among them: by any. None: nothing of it is rendered yet.
   Result<std::set<std::string>> renderers(const Digest& job);
-  Status record_frame_file(const Digest& job, const FrameFile& file);
+  /// nullopt: the job's file of the frame is not in its place any more.
+  Status record_frame_file(const Digest& job, FrameIndex frame,
+                           const std::optional<FrameFile>& file);
   /// folder: that is marked now; nullopt: the mark goes.
   Status record_output_mark(const Digest& job, const std::optional<std::string>& folder);
   /// What a job's output folder was, without links, when it was marked or a frame locked in it.

@@ -15,6 +15,10 @@ constexpr std::size_t kCompletionsPerPiece = 4096;
 
 constexpr int kMaxFound = 20;
 
+/// That a worker may have written a frame stays.
+constexpr const char* kForgetFrameFiles =
+    "UPDATE frame_files SET digest = '', size_bytes = 0, inode = 0, time_ns = 0 WHERE job = ?";
+
 }  // namespace
 
 Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes& detail,
@@ -46,7 +50,7 @@ Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes
   }
   for (const char* const sql :
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "DELETE FROM frame_files WHERE job = ?", "UPDATE jobs SET archived = 1 WHERE digest = ?"})
+        kForgetFrameFiles, "UPDATE jobs SET archived = 1 WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   return {};
 }
@@ -57,7 +61,7 @@ Status Journal::restart_job(const Digest& job) {
         "INSERT OR IGNORE INTO former_renderers SELECT job, '' FROM mixed_jobs WHERE job = ?",
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "DELETE FROM completions WHERE job = ?", "DELETE FROM frame_files WHERE job = ?",
+        "DELETE FROM completions WHERE job = ?", kForgetFrameFiles,
         "DELETE FROM renderers WHERE job = ?", "DELETE FROM mixed_jobs WHERE job = ?",
         "UPDATE jobs SET archived = 0 WHERE digest = ?"})
     BATON_TRY(change(sql, job));

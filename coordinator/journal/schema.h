@@ -70,7 +70,8 @@ inline constexpr const char* kSchema = R"sql(
 )sql";
 
 /// Tables that a journal of this version may lack: it gets them when it is opened, and an earlier
-/// program leaves them alone. `frame_files` says how a frame's file stood when it had this digest,
+/// program leaves them alone. `frame_files` says how a frame's file stood when it had this digest
+/// (none: a worker may have written it),
 /// `output_marks` of which open jobs the output folder is marked; store_token has one row, or none.
 /// `renderers`: by what the tasks of a job were done that are done, the last ones of `mixed_jobs`;
 /// `former_renderers`: by what those that are forgotten, empty where they were mixed.

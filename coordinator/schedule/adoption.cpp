@@ -66,7 +66,7 @@ class KeptFrames {
       if (is_there) {
         frames_[frame.index()] = Completion{assemble_task(frame), {{image}}};
         add_stats(former, old, image.digest, *frames_[frame.index()]);
-        kept_of_ = place;
+        kept_of_.insert(place);
       }
       if (!is_there) lost_.insert(frame);
 
@@ -111,7 +111,9 @@ class KeptFrames {
       adoption.lost.push_back(frame);
       if (overwritten_.contains(frame)) adoption.overwritten.insert(frame);
     }
-    adoption.beside = overwrites_ ? overwrites_ : kept_of_;
+    adoption.beside = overwrites_;
+    if (!overwrites_ && !kept_of_.empty()) adoption.beside = *kept_of_.rbegin();
+    adoption.kept_of = kept_of_;
   }
 
  private:
@@ -131,7 +133,8 @@ class KeptFrames {
   std::map<FrameNumber, FrameIndex> index_;
   std::vector<std::optional<Completion>> frames_;
   std::set<FrameIndex> lost_, others_, overwritten_;
-  std::optional<std::size_t> overwrites_, kept_of_;  ///< former jobs
+  std::optional<std::size_t> overwrites_;  ///< a former job
+  std::set<std::size_t> kept_of_;          ///< likewise
   bool other_plates_ = false;
 };
 
@@ -359,6 +362,8 @@ Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& fo
     predecessors[*adoption.former].take_tasks(with_runs, kept, files, adoption);
   if (adoption.former && !best.same_tasks && best.states < Step(timeline.num_frames()))
     predecessors[*adoption.former].cut_states(with_runs, best.states, adoption);
+  if (adoption.former && (!adoption.tasks.empty() || !adoption.plan.cuts.empty()))
+    adoption.kept_of.insert(*adoption.former);
   adoption.skipped = skipped_tasks(with_runs, kept, adoption.tasks);
   return adoption;
 }

@@ -80,6 +80,7 @@ class LeaseBook {
   std::vector<TaskIndex> of_job(const Digest& job) const;
   /// One of them; nullptr: there is none.
   const Lease* any_of(const Digest& job) const;
+  const std::map<Place, Lease>& all() const { return leases_; }
   bool empty() const { return leases_.empty(); }
   /// What the outputs of all leases will take.
   std::uint64_t expected_bytes() const { return expected_bytes_; }

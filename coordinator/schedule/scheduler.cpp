@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/job/plan/estimate.h"
+#include "common/job/plan/task_place.h"
 #include "coordinator/schedule/held_states.h"
 
 namespace baton {
@@ -53,23 +54,7 @@ std::vector<Digest> Scheduler::in_turn() const {
 }
 
 TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt) {
-  const Timeline& timeline = job.tasks.graph().timeline();
-  const auto number = [&](FrameIndex frame) { return job.spec.frames[frame.index()]; };
-  TaskPlace place{.kind = task.kind, .tile = task.tile, .attempt = attempt};
-  switch (task.kind) {
-    case TaskKind::assemble:
-      place.first = place.last = number(task.frame());
-      break;
-    case TaskKind::second_pass:
-      place.first = place.last = number(timeline.frame_of(task.step()));
-      break;
-    case TaskKind::render:
-      const StepSpan steps = timeline.steps_of(task.run());
-      place.first = number(timeline.frame_of(steps.first));
-      place.last = number(timeline.frame_of(steps.last));
-      break;
-  }
-  return place;
+  return place_of(job.spec, job.tasks.graph().timeline(), task, attempt);
 }
 
 // ---- events: jobs -------------------------------------------------------------------------------

@@ -59,6 +59,24 @@ void Scheduler::on(const ClockTicked&, TimePoint now, Actions& actions) {
     remove_worker(id, /*lost=*/true, actions);
     actions.push_back(ForgetWorker{id});
   }
+
+  // Workers end what takes too long themselves. Who does not, alive as it is, fails the task here.
+  // A lease may wait on its worker for as long as the task before it may take.
+  constexpr std::chrono::seconds kSlack{limits::kMaxSecondsToLoad + 60};
+  std::vector<Lease> overdue;
+  for (const auto& [place, lease] : leases_.all()) {
+    const std::chrono::seconds task(jobs_.at(place.first).spec.max_seconds_per_task);
+    if (now - lease.granted_at > 2 * task + kSlack) overdue.push_back(lease);
+  }
+  for (const Lease& lease : overdue) {
+    const Claim claim = find_claim(lease.worker, lease.id, now, actions);
+    if (!claim.job) continue;  // it went with one before
+    actions.push_back(RevokeLease{lease.worker, lease.id});
+    fail_attempt(claim,
+                 {lease.id, lease.worker, "its worker has it for longer than maxSecondsPerTask",
+                  /*permanent=*/false},
+                 now, actions);
+  }
 }
 
 std::size_t Scheduler::num_ready() const {

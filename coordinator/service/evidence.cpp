@@ -1,9 +1,12 @@
 #include "coordinator/service/evidence.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cerrno>
 
+#include "common/base/file_descriptor.h"
 #include "common/base/file_stamp.h"
 #include "common/job/plan/sequence.h"
 
@@ -29,6 +32,14 @@ std::vector<BlobRef> leased_inputs(const FarmCore& farm, const LeaseId& lease) {
   std::vector<BlobRef> inputs = job->tasks.ledger().inputs(job->tasks.view(), task);
   std::erase_if(inputs, [](const BlobRef& input) { return input.is_held(); });
   return inputs;
+}
+
+/// Whether the first byte of a plain file can be read; also of one that is not there.
+bool is_readable(const fs::path& path) {
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file) return errno == ENOENT || errno == ENOTDIR;
+  std::byte first{};
+  return ::pread(file.number(), &first, 1, 0) >= 0;
 }
 
 /// Why nothing can be written into a folder, or into the one where it would be made; nullopt: it
@@ -76,9 +87,9 @@ std::optional<std::string> find_hindrance(const FarmCore& farm, const LeaseId& l
   std::error_code error;
   const fs::path frame = is_frame ? frame_path(job->spec, lease.task.frame()) : fs::path();
   if (const auto stamp = stamp_of(frame); is_frame && !stamp)
-    return "a frame's place: " + stamp.error().message;
-  if (is_frame && ::access(frame.c_str(), R_OK) != 0 && errno != ENOENT && errno != ENOTDIR)
-    return "a frame's place: what is in " + frame.string() + " cannot be read";
+    return fmt::format("{}: {}", kFramesPlace, stamp.error().message);
+  if (is_frame && !is_readable(frame))
+    return fmt::format("{}: what is in {} cannot be read", kFramesPlace, frame.string());
   if (const auto closed = find_closed_folder(folder)) return closed;
   // The store's blobs lie one folder deeper.
   if (is_frame) return std::nullopt;

@@ -19,7 +19,8 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
                                         const std::string& folder, const Digest& version,
                                         const JobId& id) {
   FolderRecord record;
-  BATON_ASSIGN(record.jobs_[version], journal.renderers(version));
+  record.version_ = version;
+  BATON_ASSIGN(record.jobs_[version].renderers, journal.renderers(version));
   if (auto locks = patiently([&] { return locks_of_others(folder, id.hex()); }))
     record.locked_ = std::move(*locks);
   BATON_ASSIGN(const auto given_up, journal.given_up(id));
@@ -30,7 +31,13 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
     Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
     if (!document) continue;
     document->job.output.directory = folder;
-    BATON_ASSIGN(record.jobs_[other], journal.renderers(other));
+    Writer& writer = record.jobs_[other];
+    BATON_ASSIGN(writer.renderers, journal.renderers(other));
+    BATON_ASSIGN(const std::vector<FrameFile> granted, journal.frame_files(other));
+    for (const FrameFile& file : granted) {
+      if (file.frame.index() < document->job.frames.size())
+        writer.granted.insert(frame_path(document->job, file.frame));
+    }
     BATON_TRY(journal.for_each_completion(other, [&](const Completion& done) -> Status {
       if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
       const fs::path path = frame_path(document->job, done.task.frame());
@@ -81,13 +88,16 @@ bool FolderRecord::may_be_unreported(const fs::path& path, const FileVerdict& pi
   const auto writer = std::ranges::find_if(
       jobs_, [&](const auto& job) { return picture.writer.starts_with(job.first.hex()); });
   if (writer == jobs_.end() || is_locked(path)) return false;
-  const auto& [job, renderers] = *writer;
+  const Digest& job = writer->first;
+  const std::set<std::string>& renderers = writer->second.renderers;
   const bool is_by_us = renderers.empty() || std::ranges::any_of(renderers, [&](const auto& known) {
                           return picture.writer.ends_with(known);
                         });
   const auto images = images_.find(path);
-  return is_by_us && (images == images_.end() ||
-                      std::ranges::find(images->second, job, &Image::job) == images->second.end());
+  const bool is_reported =
+      images != images_.end() &&
+      std::ranges::find(images->second, job, &Image::job) != images->second.end();
+  return is_by_us && !is_reported && (job == version_ || writer->second.granted.contains(path));
 }
 
 bool FolderRecord::is_foreign(const FileVerdict& picture) const {

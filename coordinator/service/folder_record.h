@@ -31,8 +31,9 @@ class FolderRecord {
   /// What the file of a frame may be, as far as it is recorded.
   std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
   /// Whether a picture in the place of a frame may be replaced: a person has given it up, or it is
-  /// a job's of this folder, one that is recorded, or one that was written and never reported: by
-  /// what the job is rendered with here, or it is another coordinator's. None that another job has
+  /// a job's of this folder, one that is recorded, or one that was written and never reported: of
+  /// the version itself, which will make it again, or where a worker was granted it; by what the
+  /// job is rendered with here, or else it is another coordinator's. None that another job has
   /// locked (common/store/frame_locks.h), none while that cannot be read.
   bool may_replace(const std::filesystem::path& path, const FileVerdict& picture) const {
     return is_recorded(path, picture) || may_be_unreported(path, picture);
@@ -64,7 +65,12 @@ class FolderRecord {
   std::map<std::filesystem::path, Digest> given_up_;
   /// By others, by name; nullopt: that cannot be read.
   std::optional<std::map<std::string, std::string>> locked_;
-  std::map<Digest, std::set<std::string>> jobs_;  ///< with Journal::renderers
+  struct Writer {
+    std::set<std::string> renderers;          ///< Journal::renderers
+    std::set<std::filesystem::path> granted;  ///< frames that its workers may have written
+  };
+  std::map<Digest, Writer> jobs_;
+  Digest version_;  ///< the one that was asked for
 };
 
 /// Frames of which only a person can say what becomes of them.

@@ -82,7 +82,7 @@ Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
   // A worker of a former job may have written late.
   BATON_ASSIGN(
       const FolderRecord record,
-      FolderRecord::read(journal, jobs, job.spec.output.directory, {}, jobs.of(version).id));
+      FolderRecord::read(journal, jobs, job.spec.output.directory, version, jobs.of(version).id));
   for (const auto& [path, picture] : pictures) {
     if (record.may_replace(path, picture.second)) {
       lose(picture.first, path);

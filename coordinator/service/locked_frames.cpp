@@ -149,6 +149,21 @@ Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frame
                       job.name, which, job.output.directory, other_name, other_name, which)};
 }
 
+namespace {
+
+/// The same, where only the names of the files are known, which may be those of other frames there.
+Error locked_by_name(const JobSpec& job, const std::vector<FrameNumber>& frames,
+                     const std::string& other_name) {
+  return {ErrorKind::bad_input,
+          fmt::format("job '{}': the files of frames {} in {} are locked in job {}, and stay: "
+                      "`baton job show {}` names its locked frames, `baton job lock {} --off "
+                      "--frames N` unlocks them, another output.directory keeps them",
+                      job.name, format_frames(frames), job.output.directory, other_name, other_name,
+                      other_name)};
+}
+
+}  // namespace
+
 Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id) {
   const auto locks = patiently([&] { return locks_of_others(spec.output.directory, id.hex()); });
   if (!locks) return Error{ErrorKind::io, locks.error().message};
@@ -165,7 +180,7 @@ Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, co
     }
   }
   if (!known.empty())
-    return locked_elsewhere(spec, known.begin()->second, known.begin()->first.short_hex());
+    return locked_by_name(spec, known.begin()->second, known.begin()->first.short_hex());
   if (strange.empty()) return {};
   return Error{
       ErrorKind::bad_input,

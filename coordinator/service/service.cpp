@@ -39,9 +39,18 @@ std::string renderer_of(const WorkerHello& hello) { return hello.renderer + ", "
 /// hindrance: what the coordinator sees; why: what the worker said.
 Status wait_for_disk(FarmCore& farm, const std::string& worker, const LeaseId& lease,
                      const std::string& hindrance, const std::string& why) {
-  const std::string waits = fmt::format("{}: {}", hindrance, why.substr(0, limits::kMaxTextLength));
-  spdlog::warn("job {} waits for {}", farm.history.name_of(lease.job), waits);
-  return farm.step(SpaceLacking{worker, lease, waits});
+  const std::string told = why.substr(0, limits::kMaxTextLength);
+  const std::string waits =
+      hindrance.ends_with(told) ? hindrance : fmt::format("{}: {}", hindrance, told);
+  // What is in a frame's place does not go away as a full disk does. The first time it may be an
+  // error of the moment.
+  const Scheduler::Job* const job = farm.scheduler.find_job(lease.job);
+  const bool stays =
+      job != nullptr && hindrance.starts_with(kFramesPlace) && job->waits.starts_with(kFramesPlace);
+  spdlog::warn("job {} {} for {}", farm.history.name_of(lease.job), stays ? "is paused" : "waits",
+               waits);
+  BATON_TRY(farm.step(SpaceLacking{worker, lease, waits}));
+  return stays ? farm.step(JobPaused{lease.job, waits}) : Status();
 }
 
 }  // namespace

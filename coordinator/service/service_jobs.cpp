@@ -124,7 +124,9 @@ Status Service::restore_job(const Digest& digest) {
   if (is_open(event.status)) {
     BATON_ASSIGN(const std::vector<FrameFile> stood, farm_.journal.frame_files(digest));
     for (const FrameFile& file : stood) {
-      if (file.frame >= FrameIndex(0) && file.frame.index() < event.spec.frames.size())
+      const bool is_known = file.digest != Digest() && file.frame >= FrameIndex(0) &&
+                            file.frame.index() < event.spec.frames.size();
+      if (is_known)
         files_.add({frame_path(event.spec, file.frame), file.stamp, file.digest, {}, digest.hex()});
     }
     LostFiles lost = find_lost_files(event, farm_.store, files_, farm_.locked(digest, event.spec));

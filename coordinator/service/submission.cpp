@@ -98,7 +98,10 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
                       LockedFrames(document.job, farm_.history.jobs().locked(job))};
     Neighbour other =
         look_at(former, digest, document, files_, ended ? &ended->frames_done : nullptr, locks);
-    if (other.busy && !restart && !is_former_version) {
+    // What is only to be looked at makes way for the next look.
+    const bool may_replace =
+        restart || (document.job.output.is_look && former.document.job.output.is_look);
+    if (other.busy && !may_replace && !is_former_version) {
       return Error{
           ErrorKind::bad_input,
           fmt::format("job '{}': job {} ('{}', {}) writes into {}: wait for its end, cancel "
@@ -111,7 +114,7 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
       return Error{ErrorKind::usage, own.error().message + "; another output.directory keeps it"};
     if (!other.locked.empty())
       return locked_elsewhere(document.job, other.locked, farm_.history.name_of(digest));
-    if (!other.differing.empty() && !restart)
+    if (!other.differing.empty() && !may_replace)
       return another_picture(document.job, other, former.document.job,
                              farm_.history.name_of(digest));
     if (other.written.empty() && !other.busy) continue;
@@ -320,7 +323,6 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   std::vector<FormerJob> formers;
   // Where frames of a job are by one renderer, that of the newest which has frames decides.
   std::string newest;
-  std::set<std::string> renderers;
   bool has_frames = false;
   for (const auto& [digest, former] : *neighbours) {
     if (!(former.document.picture == document.picture) || former.renderer.empty()) continue;
@@ -337,11 +339,10 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
         !farm_.options.mixed_builds && !former.renderer.empty() && former.renderer != newest;
     const std::string held = held_to(former.renderer, former.is_mixed, farm_.options.mixed_builds);
     if (is_other || (restart && farm_.scheduler.leases().nobody_renders_as(held))) {
-      reasons.push_back("nothing is kept that was rendered with " + former.renderer);
+      std::string reason = "nothing is kept that was rendered with " + held;
+      if (std::ranges::find(reasons, reason) == reasons.end()) reasons.push_back(std::move(reason));
       continue;
     }
-    heritage.is_mixed = heritage.is_mixed || former.is_mixed;
-    if (!former.renderer.empty()) renderers.insert(former.renderer);
     formers.push_back(std::move(former));
     heritage.formers.push_back(digest);
   }
@@ -374,12 +375,14 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
       !formers.empty() && std::ranges::any_of(adoption.frames, [&](const Completion& frame) {
         return !locked.contains(frame.task.frame());
       });
-  if (adoption.former) {
-    heritage.renderer = formers[*adoption.former].renderer;
-  } else if (has_rendered && !farm_.options.mixed_builds) {
-    heritage.renderer = newest;
+  if (adoption.former) heritage.renderer = formers[*adoption.former].renderer;
+  if (!adoption.former && has_rendered && !farm_.options.mixed_builds) heritage.renderer = newest;
+  std::set<std::string> renderers;
+  for (const std::size_t former : adoption.kept_of) {
+    heritage.is_mixed = heritage.is_mixed || formers[former].is_mixed;
+    if (!formers[former].renderer.empty()) renderers.insert(formers[former].renderer);
   }
-  heritage.is_mixed = (heritage.is_mixed || renderers.size() > 1) && !adoption.empty();
+  heritage.is_mixed = heritage.is_mixed || renderers.size() > 1;
   return heritage;
 }
 
@@ -415,6 +418,8 @@ Status Submission::take_over(const Heritage& heritage, const std::string& text, 
 
   if (text.empty()) {
     BATON_TRY(farm_.journal.restart_job(event.job));
+    for (const FrameIndex frame : adoption.lost)
+      BATON_TRY(farm_.journal.record_frame_file(event.job, frame, std::nullopt));
   } else {
     BATON_TRY(
         farm_.journal.add_job(event.job, text, {event.spec.name, event.spec.output.directory}));

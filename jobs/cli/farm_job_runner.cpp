@@ -57,7 +57,7 @@ Status FarmJobRunner::submit(const JobSpec& wanted, std::size_t index, std::vect
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const std::optional<JobAccepted> accepted,
                ask_farm<JobAccepted>(*farm_, *client_, signals_,
-                                     SubmitJob{std::move(document), /*restart=*/true}));
+                                     SubmitJob{std::move(document), !job.output.is_look}));
   if (!accepted) return stopped();
   open.push_back({index, accepted->identity.id});
   return {};

@@ -83,7 +83,10 @@ Result<WantedJob> load_wanted(const JobArgument& argument, bool look) {
   const bool changed = !plain || *plain != job;
   const bool own_folder = plain && plain->output.directory != job.output.directory;
   WantedJob wanted{std::move(job), (look || changed) && !own_folder};
-  if (wanted.is_look) wanted.job.output.directory += "-look";
+  if (wanted.is_look) {
+    wanted.job.output.directory += "-look";
+    wanted.job.output.is_look = true;
+  }
   return wanted;
 }
 

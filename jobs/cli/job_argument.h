@@ -33,7 +33,7 @@ std::string command_text(const JobArgument& argument);
 struct WantedJob {
   JobSpec job;
   /// It is not what its file says: its frames go to a folder of their own (`-look` behind its
-  /// name), in which a later look of a frame replaces it.
+  /// name), and it is a look (OutputSpec::is_look).
   bool is_look = false;
 };
 /// Reads the file. `look`: a look even if the options change nothing. Errors: load_job's.

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <random>
+#include <string_view>
 #include <thread>
 
 #include "common/base/files.h"
@@ -31,19 +31,21 @@ constexpr milliseconds kCoordinatorPatience{5000 * kPatienceFactor};
 constexpr int kMaxRestarts = 5;
 constexpr std::chrono::seconds kShortLife{60};
 
-/// An address on this machine that no other farm will have: Linux's abstract sockets have names,
-/// not numbers. A port goes to somebody else while a coordinator that died is started again, and
-/// then two farms are one.
-std::string draw_endpoint() {
-  std::random_device random;
-  return fmt::format("ipc://@baton-{:08x}{:08x}", random(), random());
-}
-
 /// The share of one worker; there is one.
 std::uint64_t memory_mib_of_each(const FarmOptions& options) {
   const std::uint64_t all =
       options.memory_bytes > 0 ? options.memory_bytes : default_memory_bytes();
   return std::max<std::uint64_t>(1, (all >> 20) / static_cast<std::uint64_t>(options.workers));
+}
+
+/// Of a farm that was killed in this work folder.
+void remove_left_socket(const fs::path& endpoint_file) {
+  constexpr std::string_view kScheme = "ipc://";
+  const Result<std::string> endpoint = read_text_file(endpoint_file, limits::kMaxTextLength);
+  if (!endpoint || !endpoint->starts_with(kScheme)) return;
+  PrivateFolder::remove_left(
+      fs::path(endpoint->substr(kScheme.size(), endpoint->find('\n') - kScheme.size()))
+          .parent_path());
 }
 
 }  // namespace
@@ -56,7 +58,7 @@ Result<FileDescriptor> LocalFarm::lock_directory(const fs::path& directory) {
                  fmt::format("{}: cannot create: {}", directory.string(), error.message())};
 
   const fs::path path = directory / "lock";
-  FileDescriptor lock(::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
+  FileDescriptor lock(::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600));
   if (!lock)
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot open: {}", path.string(), std::strerror(errno))};
@@ -72,8 +74,14 @@ Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
   BATON_ASSIGN(const std::string coordinator, sibling_program("baton-coordinator"));
   BATON_ASSIGN(const std::string worker, sibling_program("baton-worker"));
   BATON_ASSIGN(FileDescriptor lock, lock_directory(options.work_directory));
-  LocalFarm farm(options, options.listen.empty() ? draw_endpoint() : options.listen,
-                 std::move(lock));
+  remove_left_socket(options.work_directory / "endpoint");
+  // A port goes to somebody else while a coordinator that died is started again, and is open to all
+  // users of the machine; a socket in a folder of its own is neither.
+  PrivateFolder folder;
+  if (options.listen.empty()) {
+    BATON_ASSIGN(folder, PrivateFolder::make());
+  }
+  LocalFarm farm(options, std::move(folder), std::move(lock));
   BATON_TRY(farm.start_coordinator(coordinator));
   for (int i = 1; i <= options.workers; ++i) {
     std::vector<std::string> command{worker,

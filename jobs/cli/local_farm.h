@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/private_folder.h"
 #include "common/base/result.h"
 #include "jobs/cli/child_process.h"
 
@@ -19,7 +20,7 @@ struct FarmOptions {
   std::uint64_t memory_bytes = 0;
   /// Journal, blobs, logs; what a resume needs.
   std::filesystem::path work_directory;
-  /// Where the coordinator listens; empty: where only this machine reaches it.
+  /// Where the coordinator listens; empty: where only this user reaches it.
   std::string listen = {};
   /// File of the coordinator's key; empty: none.
   std::string server_key = {};
@@ -28,7 +29,8 @@ struct FarmOptions {
   std::string isa = {};
 };
 
-/// A coordinator and workers on this machine, as child processes, at an address of their own. A
+/// A coordinator and workers on this machine, as child processes, at an address of their own that
+/// only this user reaches. A
 /// program that dies is started again: the coordinator goes on from its journal on the same
 /// endpoint, a worker's lost work is done again.
 class LocalFarm {
@@ -40,7 +42,9 @@ class LocalFarm {
 
   /// The farm of a coordinator that somebody else looks after: it has no programs to tend.
   static LocalFarm attach(const std::string& endpoint) {
-    return {{}, endpoint, FileDescriptor(-1)};
+    FarmOptions options;
+    options.listen = endpoint;
+    return {std::move(options), {}, FileDescriptor(-1)};
   }
 
   /// Replaces programs that have ended, with a warning. Error: one has ended too often, each time
@@ -63,14 +67,20 @@ class LocalFarm {
     std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   };
 
-  LocalFarm(FarmOptions options, std::string endpoint, FileDescriptor lock)
-      : options_(std::move(options)), endpoint_(std::move(endpoint)), lock_(std::move(lock)) {}
+  LocalFarm(FarmOptions options, PrivateFolder folder, FileDescriptor lock)
+      : options_(std::move(options)),
+        folder_(std::move(folder)),
+        endpoint_(options_.listen.empty() ? "ipc://" + (folder_.path() / "farm").string()
+                                          : options_.listen),
+        lock_(std::move(lock)) {}
   static Result<FileDescriptor> lock_directory(const std::filesystem::path& directory);
   Status start_coordinator(const std::string& program);
   Status add_member(const std::string& name, std::vector<std::string> command);
   std::filesystem::path log_of(const std::string& name) const;
 
   FarmOptions options_;
+  /// Of the socket; none where another address is listened at.
+  PrivateFolder folder_;
   std::string endpoint_;
   /// Holds the work directory as long as it is open.
   FileDescriptor lock_;

@@ -99,7 +99,7 @@ class Draw(Motion, Pictures, Textures):
             "image.width": lambda: self.side(), "image.height": lambda: self.side(),
             "image.tileSize": lambda: self.tile_size(), "image.region": nothing, "image.scale": nothing,
             "image.overscan": lambda: self.overscan() if self.chance(0.2) else None,
-            "output.directory": nothing, "output.plate": nothing,
+            "output.directory": nothing, "output.plate": nothing, "output.look": nothing,
             "output.background": lambda: self.pick("environment", "transparent", "transparent", "plate"),
             "output.pattern": lambda: self.pick(None, "f.#.exr", "a b ######.exr", "\u00e4####x.exr"),
             # 16 bits hide what differs in the last ones.

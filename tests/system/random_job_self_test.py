@@ -23,7 +23,7 @@ from random_job_shrink import shrink
 # Keys that are meant to stay away: what makes a job fail by itself, what is set when it is rendered, and those of
 # `auto`, which is rare; what Baton writes itself when it takes a glTF file apart.
 NEVER_DRAWN = {"quality.maxRounds", "quality.noiseThreshold", "quality.timeLimit", "scene.files", "scene.files[].path", "scene.meshes.*.mesh", "scene.meshes.*.primitive",
-               "maxRetriesPerTask", "maxSecondsPerTask", "maxFailuresPerWorker", "output.directory",
+               "maxRetriesPerTask", "maxSecondsPerTask", "maxFailuresPerWorker", "output.directory", "output.look",
                "sampling.targetError", "sampling.timeBudget"}
 CASES = 1500
 

@@ -95,6 +95,10 @@ def a_live_coordinator_survives_any_message(programs, folder):
             if kind == "version":
                 check("version 127" in answer, f"the refusal does not name the version: {answer}")
 
+        # Answers that nobody reads.
+        programs.run("send_raw", farm.endpoint, "unread")
+        check(farm.coordinator.alive(), f"the coordinator died\n{farm.coordinator.log()}")
+
         # Bytes that are not even ZeroMQ.
         host, port = farm.endpoint.removeprefix("tcp://").split(":")
         for raw in [b"GET / HTTP/1.1\r\n\r\n", bytes(range(256)) * 64, b""]:

@@ -7,7 +7,7 @@ import subprocess
 
 from assets import write_map
 from exr_frames import read_frame
-from farm import BAD_INPUT, OK, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
+from farm import BAD_INPUT, IO, OK, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
 from png_files import read_png, srgb
 
@@ -44,28 +44,36 @@ def test_a_look_leaves_finished_frames_alone(programs, folder):
 
 
 def test_a_look_replaces_looks_only(programs, folder):
-    """What another job or somebody has put into a folder of that name stays, until --restart makes it a folder of looks."""
+    """What another job or somebody has put into a folder of that name stays, until --restart."""
     job, other = job_at(folder), folder / "other"
-    programs.render(job_at(other, seed=3, output={"directory": str(folder / "frames-look")}), other / "work")
-    theirs = programs.pixels(folder / "frames-look")
+    theirs = job_at(other, seed=3, output={"directory": str(folder / "frames-look")})
+    programs.render(theirs, other / "work")
+    frames = programs.pixels(folder / "frames-look")
     look = ("render", job, "--work-dir", folder / "work", "--frames", "2", "--scale", ".5")
-    programs.refuses(*look, says=["frames-look", "no look or comparison has made that", "--restart", "--set output.directory"])
-    check_equal(programs.pixels(folder / "frames-look"), theirs, "frames of another job")
+    check_says(programs.run("baton", *look, expect=IO).stderr, "frame.0002.exr is not what a job has written", "--restart")
+    check_equal(programs.pixels(folder / "frames-look"), frames, "frames of another job")
     programs.run("baton", *look, "--restart", expect=OK)
     programs.run("baton", *look[:-1], ".25", expect=OK)
     check_equal(read_frame(folder / "frames-look/frame.0002.exr").width, 40, "width of the last look")
+    done = programs.run("baton", "render", theirs, "--work-dir", other / "work", expect=IO)
+    check_says(done.stderr, "frame.0002.exr is not what a job has written")
 
-    # A job whose frames the next look would replace goes elsewhere; what is handed in is a look likewise.
-    says = ["frames-look", "another output.directory keeps them"]
-    programs.refuses("render", other / "job.json", "--work-dir", other / "work", says=says)
+    # In one coordinator: beside a job that has rendered nothing yet, and beside its frames.
     shutil.rmtree(folder / "frames-look")
-    programs.render(other / "job.json", other / "again")
     with Farm(programs, folder / "farm") as farm:
+        ident = farm.submit(theirs)
         submit = ("job", "submit", job, "--frames", "2")
-        check_says(farm.baton(*submit, expect=BAD_INPUT).stderr, "no look or comparison has made that", "--restart")
-        check_equal(programs.pixels(folder / "frames-look"), theirs, "frames of another job, beside a farm")
-        farm.baton(*submit, "--restart")
-        check_says(farm.baton("job", "submit", other / "job.json", expect=BAD_INPUT).stderr, *says)
+        says = ["it would replace", "--restart"]
+        check_says(farm.baton(*submit, expect=BAD_INPUT).stderr, *says)
+        check_equal(farm.show(ident)["status"], "running", "status of the job")
+        farm.start_worker()
+        farm.wait_for(ident)
+        check_says(farm.baton(*submit, expect=BAD_INPUT).stderr, *says)
+        check_equal(programs.pixels(folder / "frames-look"), frames, "frames of another job, beside a farm")
+        for more in (["--restart"], ["--scale", ".25"]):
+            farm.wait_for(farm.baton(*submit, *more).stdout.strip())
+        check_equal(read_frame(folder / "frames-look/frame.0002.exr").width, 40, "width of the last look")
+        check_says(farm.baton("job", "submit", theirs, expect=BAD_INPUT).stderr, *says)
 
 
 def test_the_sheet_has_numbers_and_one_exposure(programs, folder):

@@ -3,8 +3,9 @@
 
 import json
 import re
+from pathlib import Path
 
-from farm import BAD_INPUT, Farm, Process, check, check_equal, run_tests, wait_until
+from farm import BAD_INPUT, OK, Farm, Process, check, check_equal, run_tests, wait_until
 from jobs import make_job, write_job
 
 SLOW = {"numParticles": 16, "numCandidates": 512, "numDistributions": 48}
@@ -63,8 +64,25 @@ def two_farms_of_one_machine_never_meet(programs, folder):
     for _ in range(2):
         programs.render(path, folder / "work")
         addresses.append((folder / "work/endpoint").read_text(encoding="utf-8"))
-    check(all(address.startswith("ipc://@") for address in addresses), f"listens at {addresses}")
+    check(all(address.startswith("ipc:///") for address in addresses), f"listens at {addresses}")
     check(addresses[0] != addresses[1], f"both listen at {addresses[0]}")
+
+
+def nobody_else_reaches_a_render(programs, folder):
+    """Its socket lies in a folder of this user; one that is killed leaves it to the next to remove."""
+    path = make(folder)
+    command = [programs.path("baton"), "render", str(path), "--work-dir", str(folder / "work")]
+    endpoint = folder / "work/endpoint"
+    running = Process(command, folder / "render.log")
+    wait_until(endpoint.exists, "it listens")
+    place = Path(endpoint.read_text(encoding="utf-8").strip().removeprefix("ipc://")).parent
+    check_equal(oct(place.stat().st_mode & 0o777), "0o700", "rights of the folder")
+    running.kill()
+    running.wait()
+    check(place.exists(), "who is killed removes nothing")
+    wait_until(lambda: programs.run("baton", *command[1:], expect=None).returncode == OK, "it goes on")
+    after = Path(endpoint.read_text(encoding="utf-8").strip().removeprefix("ipc://")).parent
+    check(not place.exists() and not after.exists(), f"left: {place}, {after}")
 
 
 def an_edited_job_does_not_mix_with_the_one_before(programs, folder):

@@ -20,6 +20,7 @@
 #include "common/base/limits.h"
 #include "common/base/patiently.h"
 #include "common/job/plan/sequence.h"
+#include "common/job/plan/task_place.h"
 #include "common/job/text/job_json.h"
 #include "common/math/instruction_set.h"
 #include "common/protocol/worker_channel.h"
@@ -97,7 +98,7 @@ class NoteLog {
 
 /// What loading a job may take, the wait for its document and for another thread's loading
 /// included.
-constexpr std::chrono::minutes kLoadPatience{15};
+constexpr std::chrono::seconds kLoadPatience{limits::kMaxSecondsToLoad};
 
 /// Executes a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
@@ -359,9 +360,16 @@ class Worker {
   }
   void log_failure(const TaskEnded& ended) const {
     if (ended.result || ended.result.error().kind == ErrorKind::cancelled) return;
-    spdlog::error("job {} {} step {} tile {} failed: {}", name_of(ended.lease.job),
-                  task_name(ended.lease.task.kind), ended.lease.task.position,
-                  ended.lease.task.tile, ended.result.error().message);
+    spdlog::error("job {}: {} failed: {}", name_of(ended.lease.job), place_of_task(ended.lease),
+                  ended.result.error().message);
+  }
+  /// As the coordinator says it, once the job is loaded.
+  std::string place_of_task(const LeaseId& lease) const {
+    for (const LoadedJobPtr& loaded : jobs_.loaded()) {
+      if (loaded->digest == lease.job)
+        return place_text(place_of(loaded->job, Timeline(loaded->job), lease.task));
+    }
+    return fmt::format("{}, tile {}", task_name(lease.task.kind), lease.task.tile);
   }
 
   WorkerChannel channel_;

@@ -225,6 +225,7 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
   a.number("framesPerSecond", output.frames_per_second, {1, 1000});
   a.choice("naming", output.naming, kFrameNamings);
   a.boolean("clampNegative", output.clamp_negative);
+  a.boolean("look", output.is_look);
 }
 
 void fields(JobArchive& a, StateSpec& state) {

@@ -16,7 +16,6 @@
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_argument.h"
-#include "jobs/cli/look_folder.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
 #include "jobs/study/as_shown.h"
@@ -71,6 +70,7 @@ JobSpec with_seed(JobSpec job, std::size_t number, std::uint64_t more, const fs:
   job.output.aovs.clear();
   job.output.pixel_type = PixelType::full_float;
   job.output.clamp_negative = false;
+  job.output.is_look = false;
   return job;
 }
 
@@ -86,6 +86,7 @@ Result<Compared> load(const CompareOptions& options, std::size_t number, const f
   for (const std::string& line : left_out) spdlog::warn("{}", line);
   BATON_TRY(settle_method(compared.job, farm));
   compared.job.output.directory = output / compared.job.name;
+  compared.job.output.is_look = true;
   for (std::size_t seed = 1; options.noise && seed <= 2; ++seed)
     compared.seeds.push_back(with_seed(compared.job, number, seed, farm.work_directory));
   return compared;
@@ -232,9 +233,6 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
     jobs.push_back(std::move(compared));
   }
   BATON_TRY(check_alike(jobs, options));
-
-  for (const Compared& compared : jobs)
-    BATON_TRY(claim_look_folder(compared.job.output.directory, "another --output keeps it"));
 
   // Render all of them, and with their other seeds.
   std::vector<JobSpec> all;

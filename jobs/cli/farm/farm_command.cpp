@@ -15,7 +15,6 @@
 #include "jobs/cli/farm/farm_status.h"
 #include "jobs/cli/farm/slurm_farm.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/look_folder.h"
 #include "jobs/cli/render/render_session.h"
 #include "jobs/cli/settle_method.h"
 
@@ -119,8 +118,7 @@ Result<ExitCode> work(RenderSession& session, const RenderOptions& options,
     BATON_TRY(session.keep_running(tend_pilots));
     return ExitCode::ok;
   }
-  BATON_TRY(claim_output(*wanted, options.restart));
-  const bool restart = options.restart || options.from_frame || wanted->is_look;
+  const bool restart = options.restart || options.from_frame;
   BATON_ASSIGN(const std::optional<JobStatus> status, session.render(wanted->job, restart, [&] {
     tend_pilots();
     return false;

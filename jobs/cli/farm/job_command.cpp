@@ -19,7 +19,6 @@
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
-#include "jobs/cli/look_folder.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -66,8 +65,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   // A pilot takes its time: first see that there is somebody to submit to.
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
   BATON_TRY(settle_method_at(job, options.link));
-  BATON_TRY(claim_output(wanted, options.restart));
-  const bool restart = options.restart || options.from_frame || wanted.is_look;
+  const bool restart = options.restart || options.from_frame;
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
                ask_until_done<JobAccepted>(client, SubmitJob{std::move(document), restart}));
@@ -182,7 +180,9 @@ Result<ExitCode> lock(const JobOptions& options, RequestClient& client) {
              options.off ? "not locked any more" : "locked: they stay and count as done");
   print_detail(after, options.json);
   const JobStatus status = after.detail.summary.status;
-  if (status == JobStatus::failed || status == JobStatus::cancelled)
+  const bool may_go_on =
+      status == JobStatus::cancelled || (status == JobStatus::failed && after.detail.waits.empty());
+  if (may_go_on)
     fmt::print(stderr, "the job is {}: baton job retry {} goes on with it\n",
                job_status_name(status), after.identity.id.short_hex());
   return ExitCode::ok;

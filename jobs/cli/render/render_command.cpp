@@ -6,7 +6,6 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/look_folder.h"
 #include "jobs/cli/render/render_watch.h"
 #include "jobs/cli/settle_method.h"
 
@@ -25,7 +24,6 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   JobSpec& job = wanted.job;
   BATON_TRY(begin_at(job, options.from_frame));
   BATON_TRY(check_out(options, job));
-  BATON_TRY(claim_output(wanted, options.restart));
   if (wanted.is_look) spdlog::info("a look: frames go to {}", job.output.directory);
   const FarmOptions farm = farm_options(options, job);
   BATON_TRY(settle_method(job, farm));
@@ -33,7 +31,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   const SignalWait signals;
   BATON_ASSIGN(RenderSession session, RenderSession::start(options, farm, signals));
   const Result<std::optional<JobStatus>> rendered =
-      session.render(job, options.restart || options.from_frame || wanted.is_look);
+      session.render(job, options.restart || options.from_frame);
   if (!rendered) {
     session.stop();
     return rendered.error();

@@ -6,7 +6,6 @@
 #include <filesystem>
 
 #include "common/scene/settle/settle_motion.h"
-#include "jobs/cli/look_folder.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -38,12 +37,13 @@ std::string stamp(const std::string& path) {
 
 /// Renders the job at a quarter of its size, then whole.
 Result<std::optional<JobStatus>> render_twice(RenderSession& session, const JobSpec& job,
+                                              bool restart,
                                               const std::function<bool()>& interrupted) {
   JobSpec coarse = job;
   coarse.image = scaled(job.image, kCoarseScale);
-  BATON_ASSIGN(const std::optional<JobStatus> status, session.render(coarse, true, interrupted));
+  BATON_ASSIGN(const std::optional<JobStatus> status, session.render(coarse, restart, interrupted));
   if (!status || *status != JobStatus::done || coarse.image == job.image) return status;
-  return session.render(job, true, interrupted);
+  return session.render(job, restart, interrupted);
 }
 
 }  // namespace
@@ -73,10 +73,9 @@ Result<ExitCode> watch_and_render(const RenderOptions& options) {
     Result<WantedJob> version = load_settled(options.job, true);
     Status outcome = version ? check_out(options, version->job) : Status(version.error());
     if (outcome.ok()) outcome = settle_method(version->job, farm);
-    if (outcome.ok()) outcome = claim_output(*version, options.restart);
     if (outcome.ok()) {
       spdlog::info("a look: frames go to {}", version->job.output.directory);
-      const auto rendered = render_twice(session, version->job, interrupted);
+      const auto rendered = render_twice(session, version->job, options.restart, interrupted);
       if (!rendered) outcome = rendered.error();
       stop = rendered && !*rendered && !changed;
     }

@@ -299,8 +299,11 @@ TEST_F(JournalTest, TablesThatCameLaterAreMadeWhenTheyAreMissing) {
     Journal journal = open();
     EXPECT_EQ(journal.jobs().value().size(), 1u) << "the job goes on";
     EXPECT_TRUE(journal.frame_files(kJob).value().empty());
-    ASSERT_TRUE(journal.record_frame_file(kJob, {FrameIndex(3), digest_of("old"), {}}).ok());
-    ASSERT_TRUE(journal.record_frame_file(kJob, file).ok());
+    ASSERT_TRUE(
+        journal
+            .record_frame_file(kJob, FrameIndex(3), FrameFile{FrameIndex(3), digest_of("old"), {}})
+            .ok());
+    ASSERT_TRUE(journal.record_frame_file(kJob, file.frame, file).ok());
     ASSERT_TRUE(journal.record_output_mark(kJob, "/frames").ok());
     ASSERT_TRUE(journal.commit().ok());
   }

@@ -62,6 +62,30 @@ TEST_F(SchedulerTest, AnyMessageIsASignOfLife) {
   EXPECT_EQ(farm.progress().tasks_leased, 2u);
 }
 
+// Honest workers report that themselves, before.
+TEST_F(SchedulerTest, ALeaseThatIsHeldForTooLongFailsItsTask) {
+  const LeaseId held = farm.ask_one("a").lease;
+  const auto may_take = std::chrono::seconds(2 * JobSpec().max_seconds_per_task);
+  const auto failed_after = [&](std::chrono::seconds time) {
+    std::vector<RecordFailure> failed;
+    for (const TimePoint end = farm.now + time; farm.now < end; farm.now += kSilence) {
+      farm.step(WorkerAlive{"a", {held}});
+      farm.step(WorkerAlive{"b", {}});
+      for (RecordFailure& failure : all_of<RecordFailure>(farm.step(ClockTicked{})))
+        failed.push_back(std::move(failure));
+    }
+    return failed;
+  };
+  EXPECT_THAT(failed_after(may_take), IsEmpty());
+  const std::vector<RecordFailure> failed = failed_after(20min);
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].failure.lease, held);
+  EXPECT_THAT(failed[0].failure.message, HasSubstr("longer than maxSecondsPerTask"));
+  EXPECT_EQ(farm.ask_one("b").lease.task, held.task);
+  farm.step(WorkerAlive{"a", {held}});
+  EXPECT_EQ(farm.progress().tasks_leased, 1u) << "it is not taken up again";
+}
+
 TEST_F(SchedulerTest, AGrantThatNeverArrivedIsFoundByTheHeartbeat) {
   const GrantLease lost = farm.ask_one("a");
   farm.step(WorkerAlive{"a", {}});
