@@ -141,28 +141,13 @@ Status drop_stale_locks(Journal& journal, const JobSpec& spec, const IdentityBoo
 }
 
 Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,
-                       const std::string& other_name) {
-  const std::string which = format_frames(frames);
+                       const std::string& other_name, const std::vector<FrameNumber>& there) {
   return {ErrorKind::bad_input,
           fmt::format("job '{}': frames {} in {} are locked in job {}, and stay: `baton job lock "
                       "{} --off --frames {}` unlocks them, another output.directory keeps them",
-                      job.name, which, job.output.directory, other_name, other_name, which)};
-}
-
-namespace {
-
-/// The same, where only the names of the files are known, which may be those of other frames there.
-Error locked_by_name(const JobSpec& job, const std::vector<FrameNumber>& frames,
-                     const std::string& other_name) {
-  return {ErrorKind::bad_input,
-          fmt::format("job '{}': the files of frames {} in {} are locked in job {}, and stay: "
-                      "`baton job show {}` names its locked frames, `baton job lock {} --off "
-                      "--frames N` unlocks them, another output.directory keeps them",
                       job.name, format_frames(frames), job.output.directory, other_name, other_name,
-                      other_name)};
+                      format_frames(there))};
 }
-
-}  // namespace
 
 Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id) {
   const auto locks = patiently([&] { return locks_of_others(spec.output.directory, id.hex()); });
@@ -180,7 +165,8 @@ Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, co
     }
   }
   if (!known.empty())
-    return locked_by_name(spec, known.begin()->second, known.begin()->first.short_hex());
+    return locked_elsewhere(spec, known.begin()->second, known.begin()->first.short_hex(),
+                            jobs.locked(known.begin()->first));
   if (strange.empty()) return {};
   return Error{
       ErrorKind::bad_input,

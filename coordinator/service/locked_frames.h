@@ -55,9 +55,9 @@ Status tell_locks_again(Journal& journal, const JobSpec& spec, const IdentityBoo
 /// then, or have had another name when they were locked. Errors: the journal's.
 Status drop_stale_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs);
 /// Why a job is refused that would replace frames that are locked in another one. other_name:
-/// short, of that job.
+/// short, of that job. there: how they are numbered in it, where names of files meet.
 Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,
-                       const std::string& other_name);
+                       const std::string& other_name, const std::vector<FrameNumber>& there);
 /// By what stands in the folder. Errors: bad_input, another job has locked frames of this one; io,
 /// it cannot be read.
 Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id);

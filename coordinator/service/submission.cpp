@@ -113,7 +113,8 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
     if (!own && (other.has_place || other.busy))
       return Error{ErrorKind::usage, own.error().message + "; another output.directory keeps it"};
     if (!other.locked.empty())
-      return locked_elsewhere(document.job, other.locked, farm_.history.name_of(digest));
+      return locked_elsewhere(document.job, other.locked, farm_.history.name_of(digest),
+                              other.locked);
     if (!other.differing.empty() && !may_replace)
       return another_picture(document.job, other, former.document.job,
                              farm_.history.name_of(digest));

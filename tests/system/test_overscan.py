@@ -83,7 +83,7 @@ def test_looks_and_pictures_of_it(programs, folder):
     check_equal((part.display, part.window), ((0, 0, 160, 96), (31, 16, 90, 67)), "windows of a region")
     check_equal(list(part.channels["G"]), [whole.channels["G"][(y + 4) * 169 + x + 9] for y in range(16, 67) for x in range(31, 90)],
                 "pixels of the region")
-    programs.render(path, folder / "work3", extra=["--scale", ".5"])
+    programs.render(path, folder / "work2", extra=["--scale", ".5"])
     half = read_frame(folder / "frames-look/frame.0001.exr")
     check_equal((half.display, half.window), ((0, 0, 80, 48), (-5, -2, 80, 57)), "windows at half the size")
     for value, text in [("[1,2]", "expected a number or a list of 4 numbers, got a list of 2"),

@@ -204,6 +204,7 @@ def what_unlike_renderers_made_is_not_compared(programs, folder):
             if mixes:
                 farm.wait_for(ident)
                 check("different bytes" not in farm.coordinator.log(), "they were compared")
+        wait_until(lambda: farm.show(ident).get("waits"), "it waits")
         check_says(farm.show(ident)["waits"], "with several builds or instruction sets", "--mixed-builds goes on", "--restart", "--from-frame")
         farm.baton("job", "submit", path, "--restart")
         farm.wait_for(ident)

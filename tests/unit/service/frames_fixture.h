@@ -56,6 +56,21 @@ struct FramesTest : ServiceTest {
     sync(worker);
     return id;
   }
+  /// Does what there is until it has the assembly of frame 2, which it does not do.
+  LeaseId wait_for_frame_2(FakeWorker& worker) {
+    for (int i = 0; i < 20; ++i) {
+      worker.say(LeaseRequest{1});
+      const LeaseGrant grant = worker.expect<LeaseGrant>();
+      granted = grant.may_replace;
+      if (grant.lease.task == assemble_task(FrameIndex(1))) return grant.lease;
+      worker.say(worker.work(grant.lease));
+    }
+    ADD_FAILURE() << "frame 2 is not asked for";
+    return {};
+  }
+  /// LeaseGrant::may_replace of its last grant.
+  std::vector<Digest> granted;
+
   /// Does what there is, until the job has ended.
   JobDetail finish(const std::string& endpoint, FakeWorker& worker, const Digest& id) {
     for (const auto deadline = std::chrono::steady_clock::now() + kPatience;

@@ -87,9 +87,17 @@ TEST_F(FramesTest, ThePictureOfAFormerJobOfTheFolderIsMadeAgain) {
   urgent.priority = 7;
   const Digest former =
       ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).version;
-  FakeWorker worker(service.endpoint(), store(), job);
-  const Digest id = begin(service.endpoint(), worker);
-  put(2, std::string(kPicture) + former.hex());
+  FakeWorker worker(service.endpoint(), store(), job),
+      late(service.endpoint(), store(), urgent, "late");
+  late.hello();
+  wait_for_frame_2(late);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  worker.hello();
+  while (show(service.endpoint(), id).summary.tasks_done + 1 < kNumTasks) {
+    worker.do_one_task();
+    sync(worker);
+  }
+  put(2, std::string(kPicture) + former.hex() + " TEST, " + build_identity());
   EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
   EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
 }

@@ -52,22 +52,9 @@ TEST_F(FramesTest, APaintedFrameThatNamesItsJobIsKeptWithoutRestart) {
 struct PlaceTest : FramesTest {
   std::string picture = "picture of somebody";
 
-  LeaseId wait_for_frame_2(FakeWorker& worker) {
-    for (int i = 0; i < 20; ++i) {
-      worker.say(LeaseRequest{1});
-      const LeaseGrant grant = worker.expect<LeaseGrant>();
-      granted = grant.may_replace;
-      if (grant.lease.task == assemble_task(FrameIndex(1))) return grant.lease;
-      worker.say(worker.work(grant.lease));
-    }
-    ADD_FAILURE() << "frame 2 is not asked for";
-    return {};
-  }
   void say_taken(FakeWorker& worker, const LeaseId& lease, const std::string& writer) const {
     worker.say(LeaseReturn{lease, {}, {}, digest_of(picture), writer});
   }
-  /// LeaseGrant::may_replace of the last grant.
-  std::vector<Digest> granted;
 };
 
 TEST_F(PlaceTest, ThePictureOfSomebodyElseStaysAndTheJobFails) {
@@ -121,7 +108,28 @@ TEST_F(PlaceTest, OnceItIsGoneTheFrameIsMade) {
 }
 
 // A worker of a former version was late.
+// Once a worker was granted the frame it may have written it, reported or not.
 TEST_F(PlaceTest, WhatAFormerJobHasLeftMayGo) {
+  const RunningService service(options);
+  JobSpec urgent = job;
+  urgent.priority = 7;
+  const Digest former =
+      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).version;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  wait_for_frame_2(worker);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  put(2, picture);
+  const LeaseId lease = wait_for_frame_2(worker);
+  say_taken(worker, lease, former.hex() + " TEST, " + build_identity());
+  const LeaseId again = wait_for_frame_2(worker);
+  EXPECT_NE(again, lease);
+  EXPECT_THAT(granted, ElementsAre(digest_of(picture)));
+  worker.say(worker.work(again));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+}
+
+TEST_F(PlaceTest, WhatNobodyWasGrantedIsNoFormerJobs) {
   const RunningService service(options);
   JobSpec urgent = job;
   urgent.priority = 7;
@@ -131,13 +139,8 @@ TEST_F(PlaceTest, WhatAFormerJobHasLeftMayGo) {
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   put(2, picture);
-  const LeaseId lease = wait_for_frame_2(worker);
-  say_taken(worker, lease, former.hex() + " TEST, " + build_identity());
-  const LeaseId again = wait_for_frame_2(worker);
-  EXPECT_NE(again, lease);
-  EXPECT_THAT(granted, ElementsAre(digest_of(picture)));
-  worker.say(worker.work(again));
-  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  say_taken(worker, wait_for_frame_2(worker), former.hex() + " TEST, " + build_identity());
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::failed);
 }
 
 // Of the same document, as another coordinator has it rendered.
