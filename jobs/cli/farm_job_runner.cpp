@@ -56,8 +56,9 @@ Status FarmJobRunner::submit(const JobSpec& wanted, std::size_t index, std::vect
   job.quality.max_rounds = 0;
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const std::optional<JobAccepted> accepted,
-               ask_farm<JobAccepted>(*farm_, *client_, signals_,
-                                     SubmitJob{std::move(document), !job.output.is_look}));
+               ask_farm<JobAccepted>(
+                   *farm_, *client_, signals_,
+                   SubmitJob{std::move(document), restarts_looks_ || !job.output.is_look}));
   if (!accepted) return stopped();
   open.push_back({index, accepted->identity.id});
   return {};
@@ -83,9 +84,12 @@ Result<JobSummary> FarmJobRunner::ask(Open& job, const JobSpec& spec) {
   if (summary.status == JobStatus::paused)
     return Error{ErrorKind::io, fmt::format("run '{}' seed {} is paused: it waits for {}",
                                             spec.name, spec.seed, detail->waits)};
-  return Error{ErrorKind::bad_input, fmt::format("run '{}' seed {} {}: {}", spec.name, spec.seed,
-                                                 job_status_name(detail->summary.status),
-                                                 fmt::join(detail->failures, "\n"))};
+  return Error{
+      ErrorKind::bad_input,
+      fmt::format("run '{}' seed {} {}: {}", spec.name, spec.seed,
+                  job_status_name(detail->summary.status),
+                  detail->failures.empty() ? detail->waits
+                                           : fmt::format("{}", fmt::join(detail->failures, "\n")))};
 }
 
 Status FarmJobRunner::run(const std::vector<JobSpec>& jobs,

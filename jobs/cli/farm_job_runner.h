@@ -23,6 +23,8 @@ class FarmJobRunner final : public JobRunner {
   /// Counts all that is run from now on in one line, instead of a line for each call of run().
   void count_as_one(std::string label, std::size_t expected_frames);
   void finish_count();
+  /// Looks replace whatever is in the places of their frames; other runs do so in any case.
+  void restart_looks() { restarts_looks_ = true; }
   void say(const std::string& text) override;
 
   /// Error: cancelled when the user asked to stop.
@@ -44,6 +46,7 @@ class FarmJobRunner final : public JobRunner {
   FarmOptions options_;
   std::optional<CoordinatorLink> coordinator_;  ///< none before a local farm is started
   std::optional<RunCount> whole_;
+  bool restarts_looks_ = false;
   SignalWait signals_;
   std::optional<LocalFarm> farm_;
   std::optional<RequestClient> client_;

@@ -79,6 +79,9 @@ def a_comparison_replaces_comparisons_only(programs, folder):
     check(done.returncode in (BAD_INPUT, IO), f"exit code {done.returncode}")
     check_says(done.stderr, "frame.0002.exr is not what a job has written")
     check_equal(programs.pixels(folder / "one"), frames, "frames of a job")
+    for more in (["--restart"], ["--scale", ".5"]):
+        programs.run("baton", "compare", *paths, "--frames", "2", "--output", folder, *more, expect=OK)
+    check_equal(read_frame(folder / "one/frame.0002.exr").width, 80, "width of the last one")
 
 
 def jobs_that_cannot_be_compared_are_told_apart(programs, folder):

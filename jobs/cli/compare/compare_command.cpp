@@ -39,6 +39,7 @@ struct CompareOptions {
   std::string output;
   std::string sheet;  ///< empty: comparison.png in the folder
   bool noise = false;
+  bool restart = false;
   int workers = 1;
 };
 
@@ -241,6 +242,7 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
     all.insert(all.end(), compared.seeds.begin(), compared.seeds.end());
   {
     FarmJobRunner runner(farm);
+    if (options.restart) runner.restart_looks();
     const Status rendered = runner.run(all, [&](std::size_t index, const JobSummary& summary) {
       if (index < jobs.size()) jobs[index].summary = summary;
       return Status();
@@ -280,6 +282,8 @@ void add_compare_command(CLI::App& app, ExitCode& code) {
   command->add_option("--output", options->output,
                       "folder of frames and sheet; default: FILE-compared beside the first job, "
                       "with -look behind it where options change the jobs");
+  command->add_flag("--restart", options->restart,
+                    "replace pictures in the folder that no comparison has made");
   command->add_option("--workers", options->workers, "worker processes; default: 1")
       ->check(CLI::Range(1, 256));
   command->footer(
