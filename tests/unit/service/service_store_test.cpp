@@ -113,6 +113,9 @@ TEST_F(ServiceStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   for (int i = 0; i < 2; ++i) worker.do_one_task();
+  // What it has said is known before others are asked.
+  worker.say(Heartbeat{});
+  worker.expect<Heartbeat>();
   ask<ShownJob>(service.endpoint(), CancelJob{first.hex()}).detail;
   const Digest second =
       ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(other).value()}).version;
