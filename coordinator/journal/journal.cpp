@@ -104,7 +104,6 @@ Status Journal::count_start() {
 
 // ---- reading ------------------------------------------------------------------------------------
 
-/// Column 0 of every row.
 Result<std::vector<Digest>> Journal::jobs() {
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT digest FROM jobs WHERE archived = 0 ORDER BY position"));
@@ -215,20 +214,20 @@ Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int cou
   }
 }
 
-Result<std::vector<FrameFile>> Journal::frame_files(const Digest& job) {
+Result<std::map<FrameIndex, FrameFile>> Journal::frame_files(const Digest& job) {
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT frame, digest, size_bytes, inode, time_ns "
                                  "FROM frame_files WHERE job = ?"));
   query.bind(job);
-  std::vector<FrameFile> files;
+  std::map<FrameIndex, FrameFile> files;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return files;
     const Digest digest = Digest::from_hex(query.text(1)).value_or(Digest());
-    files.push_back({FrameIndex(static_cast<std::int32_t>(query.integer(0))), digest,
-                     FileStamp{.size_bytes = static_cast<std::uint64_t>(query.integer(2)),
-                               .inode = static_cast<std::uint64_t>(query.integer(3)),
-                               .time_ns = query.integer(4)}});
+    files[FrameIndex(static_cast<std::int32_t>(query.integer(0)))] = {
+        digest, FileStamp{.size_bytes = static_cast<std::uint64_t>(query.integer(2)),
+                          .inode = static_cast<std::uint64_t>(query.integer(3)),
+                          .time_ns = query.integer(4)}};
   }
 }
 

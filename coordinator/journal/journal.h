@@ -32,7 +32,6 @@ struct JournalledJob {
 
 /// How the file of a finished frame stood when its bytes had this digest.
 struct FrameFile {
-  FrameIndex frame{};
   /// Digest(): a worker may have written it, and nothing else is known.
   Digest digest;
   FileStamp stamp;
@@ -108,7 +107,7 @@ class Journal {
   /// What was seen of a frame when it was put together; nullopt: it is not, or nothing was told.
   Result<std::optional<FrameStats>> frame_stats(const Digest& job, FrameIndex frame);
   /// How frames of a job stand, as far as it is known; all of which an assembly was granted.
-  Result<std::vector<FrameFile>> frame_files(const Digest& job);
+  Result<std::map<FrameIndex, FrameFile>> frame_files(const Digest& job);
   /// By which workers know the store; nullopt: not recorded.
   Result<std::optional<std::string>> store_token();
   Status record_store_token(const std::string& token);

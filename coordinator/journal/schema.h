@@ -71,20 +71,18 @@ inline constexpr const char* kSchema = R"sql(
 
 /// Tables that a journal of this version may lack: it gets them when it is opened, and an earlier
 /// program leaves them alone. `frame_files` says how a frame's file stood when it had this digest
-/// (none: a worker may have written it),
-/// `output_marks` of which open jobs the output folder is marked; store_token has one row, or none.
-/// `renderers`: by what the tasks of a job were done that are done, the last ones of `mixed_jobs`;
-/// `former_renderers`: by what those that are forgotten, empty where they were mixed.
-/// Where other tables say `job`, they mean the digest of a document: a version. `versions` says of
-/// which job (JobId) it is the n-th, `identities` when what happened to that job, `locked_frames`
-/// which of its frames count as done whatever is in their files, `priorities` which priority a
-/// person has set in place of the one that is written in its document, `growth` how it has come by
-/// its sweeps. `pictures_given_up` are those that a job may replace though no job has written them;
-/// `marked_folders` what output folders were, without links, when a job marked them, or a frame in
-/// them was locked.
-/// `events` is appended to alone (FarmEvent), without an index, which would cost more than it
-/// saves; its last row stays, so that no number is given twice. Of those that are old, `event_sums`
-/// keeps count and seconds.
+/// (none: a worker may have written it), `output_marks` of which open jobs the output folder is
+/// marked; store_token has one row, or none. `renderers`: by what the tasks of a job were done that
+/// are done, the last ones of `mixed_jobs`; `former_renderers`: by what those that are forgotten,
+/// empty where they were mixed. Where other tables say `job`, they mean the digest of a document: a
+/// version. `versions` says of which job (JobId) it is the n-th, `identities` when what happened to
+/// that job, `locked_frames` which of its frames count as done whatever is in their files,
+/// `priorities` which priority a person has set in place of the one that is written in its
+/// document, `growth` how it has come by its sweeps. `pictures_given_up` are those that a job may
+/// replace though no job has written them; `marked_folders` what output folders were, without
+/// links, when a job marked them, or a frame in them was locked. `events` is appended to alone
+/// (FarmEvent), without an index, which would cost more than it saves; its last row stays, so that
+/// no number is given twice. Of those that are old, `event_sums` keeps count and seconds.
 inline constexpr const char* kLaterTables = R"sql(
   CREATE TABLE IF NOT EXISTS frame_files (
     job TEXT NOT NULL, frame INTEGER NOT NULL, digest TEXT NOT NULL,

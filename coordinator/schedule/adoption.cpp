@@ -66,7 +66,7 @@ class KeptFrames {
       if (is_there) {
         frames_[frame.index()] = Completion{assemble_task(frame), {{image}}};
         add_stats(former, old, image.digest, *frames_[frame.index()]);
-        kept_of_.insert(place);
+        if (!files_.locked.contains(frame)) kept_of_.insert(place);
       }
       if (!is_there) lost_.insert(frame);
 

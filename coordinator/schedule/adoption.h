@@ -52,7 +52,7 @@ struct Adoption {
   std::set<FrameIndex> overwritten;
   /// The newest former job that has, or else whose frames are kept.
   std::optional<std::size_t> beside;
-  /// The former jobs of which something is kept.
+  /// The former jobs of which something is kept. Locked frames are nobody's here.
   std::set<std::size_t> kept_of;
 
   bool empty() const { return frames.empty() && tasks.empty() && plan.cuts.empty(); }

@@ -1,7 +1,6 @@
 #include "coordinator/service/evidence.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -42,15 +41,36 @@ bool is_readable(const fs::path& path) {
   return ::pread(file.number(), &first, 1, 0) >= 0;
 }
 
-/// Why nothing can be written into a folder, or into the one where it would be made; nullopt: it
-/// can.
-std::optional<std::string> find_closed_folder(fs::path folder) {
+/// Nothing can be written into a folder, or into the one where it would be made; nullopt: it can.
+std::optional<Hindrance> closed_folder(fs::path folder) {
   std::error_code error;
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   if (fs::exists(folder, error) && !fs::is_directory(folder, error))
-    return "a folder in the place of " + folder.string();
+    return Hindrance{"a folder in the place of " + folder.string()};
   if (::access(folder.c_str(), R_OK | W_OK | X_OK) == 0) return std::nullopt;
-  return "a folder that can be written: " + folder.string();
+  return Hindrance{"a folder that can be written: " + folder.string()};
+}
+
+std::optional<Hindrance> frame_hindrance(const fs::path& frame) {
+  const auto stamp = stamp_of(frame);
+  if (!stamp) return Hindrance{"a frame's place: " + stamp.error().message, /*stays=*/true};
+  if (!is_readable(frame))
+    return Hindrance{"a frame's place: what is in " + frame.string() + " cannot be read",
+                     /*stays=*/true};
+  return closed_folder(frame.parent_path());
+}
+
+/// Its blobs lie one folder deeper.
+std::optional<Hindrance> store_hindrance(const fs::path& store) {
+  if (auto closed = closed_folder(store)) return closed;
+  std::error_code error;
+  for (fs::directory_iterator entry(store, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code gone;
+    if (!entry->is_directory(gone)) continue;
+    if (auto closed = closed_folder(entry->path())) return closed;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -79,27 +99,12 @@ std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const Tas
   return frame;
 }
 
-std::optional<std::string> find_hindrance(const FarmCore& farm, const LeaseId& lease) {
+std::optional<Hindrance> find_hindrance(const FarmCore& farm, const LeaseId& lease) {
   const Scheduler::Job* job = job_of_open_task(farm, lease);
   if (job == nullptr) return std::nullopt;
-  const bool is_frame = lease.task.kind == TaskKind::assemble;
-  fs::path folder = is_frame ? fs::path(job->spec.output.directory) : farm.store_directory;
-  std::error_code error;
-  const fs::path frame = is_frame ? frame_path(job->spec, lease.task.frame()) : fs::path();
-  if (const auto stamp = stamp_of(frame); is_frame && !stamp)
-    return fmt::format("{}: {}", kFramesPlace, stamp.error().message);
-  if (is_frame && !is_readable(frame))
-    return fmt::format("{}: what is in {} cannot be read", kFramesPlace, frame.string());
-  if (const auto closed = find_closed_folder(folder)) return closed;
-  // The store's blobs lie one folder deeper.
-  if (is_frame) return std::nullopt;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    std::error_code gone;
-    if (!entry->is_directory(gone)) continue;
-    if (const auto closed = find_closed_folder(entry->path())) return closed;
-  }
-  return std::nullopt;
+  return lease.task.kind == TaskKind::assemble
+             ? frame_hindrance(frame_path(job->spec, lease.task.frame()))
+             : store_hindrance(farm.store_directory);
 }
 
 std::optional<std::vector<BlobRef>> find_bad_inputs(const FarmCore& farm, FileTable& files,

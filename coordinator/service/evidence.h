@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "coordinator/service/farm_core.h"
@@ -24,12 +23,16 @@ struct ReportedFrame {
 };
 /// nullopt: no such frame is reported.
 std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const TaskDone& report);
-/// How what stands in the place of a frame begins, where that hinders.
-inline constexpr std::string_view kFramesPlace = "a frame's place";
-/// What a task of an open job lacks to write what it makes, whoever does it: "a folder that can be
-/// written", where the file system is mounted read-only, or its frame's place, where a folder
-/// or something stands that cannot be read. nullopt: nothing that can be seen from here.
-std::optional<std::string> find_hindrance(const FarmCore& farm, const LeaseId& lease);
+/// What a task of an open job lacks to write what it makes, whoever does it.
+struct Hindrance {
+  /// For people, such as "a folder that can be written: /frames".
+  std::string lacks;
+  /// Something stands in the frame's place that is no file or cannot be read: waiting does not make
+  /// it go, as it does a full disk.
+  bool stays = false;
+};
+/// nullopt: nothing that can be seen from here.
+std::optional<Hindrance> find_hindrance(const FarmCore& farm, const LeaseId& lease);
 /// The inputs of a leased task that must be read to tell whether they are damaged.
 std::vector<FileToRead> unread_inputs(const FarmCore& farm, const FileTable& files,
                                       const LeaseId& lease);

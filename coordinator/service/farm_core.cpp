@@ -250,8 +250,7 @@ Status FarmCore::perform(const GrantLease& action) {
   if (grant.lease.task.kind == TaskKind::assemble) {
     BATON_ASSIGN(grant.may_replace, replaceable(grant.lease));
     // From now on its file may be there, reported or not.
-    const FrameIndex frame = grant.lease.task.frame();
-    BATON_TRY(journal.record_frame_file(grant.lease.job, frame, FrameFile{frame, {}, {}}));
+    BATON_TRY(journal.record_frame_file(grant.lease.job, grant.lease.task.frame(), FrameFile{}));
   }
   BATON_TRY(history.granted(*scheduler.find_job(grant.lease.job), grant.lease, action.worker));
   return reply_to(action.worker, grant);

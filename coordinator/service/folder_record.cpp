@@ -33,10 +33,10 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
     document->job.output.directory = folder;
     Writer& writer = record.jobs_[other];
     BATON_ASSIGN(writer.renderers, journal.renderers(other));
-    BATON_ASSIGN(const std::vector<FrameFile> granted, journal.frame_files(other));
-    for (const FrameFile& file : granted) {
-      if (file.frame.index() < document->job.frames.size())
-        writer.granted.insert(frame_path(document->job, file.frame));
+    BATON_ASSIGN(const auto granted, journal.frame_files(other));
+    for (const auto& [frame, file] : granted) {
+      if (frame.index() < document->job.frames.size())
+        writer.granted.insert(frame_path(document->job, frame));
     }
     BATON_TRY(journal.for_each_completion(other, [&](const Completion& done) -> Status {
       if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};

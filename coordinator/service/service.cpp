@@ -36,21 +36,19 @@ Status check_leases(const std::vector<LeaseId>& running) {
 /// As Scheduler::Job::renderer has it.
 std::string renderer_of(const WorkerHello& hello) { return hello.renderer + ", " + hello.build; }
 
-/// hindrance: what the coordinator sees; why: what the worker said.
+/// why: what the worker said.
 Status wait_for_disk(FarmCore& farm, const std::string& worker, const LeaseId& lease,
-                     const std::string& hindrance, const std::string& why) {
+                     const Hindrance& hindrance, const std::string& why) {
   const std::string told = why.substr(0, limits::kMaxTextLength);
-  const std::string waits =
-      hindrance.ends_with(told) ? hindrance : fmt::format("{}: {}", hindrance, told);
-  // What is in a frame's place does not go away as a full disk does. The first time it may be an
-  // error of the moment.
+  const std::string waits = hindrance.lacks.ends_with(told)
+                                ? hindrance.lacks
+                                : fmt::format("{}: {}", hindrance.lacks, told);
+  // The first time it may be an error of the moment.
   const Scheduler::Job* const job = farm.scheduler.find_job(lease.job);
-  const bool stays =
-      job != nullptr && hindrance.starts_with(kFramesPlace) && job->waits.starts_with(kFramesPlace);
-  spdlog::warn("job {} {} for {}", farm.history.name_of(lease.job), stays ? "is paused" : "waits",
-               waits);
+  const bool pauses = job != nullptr && hindrance.stays && job->waits.starts_with(hindrance.lacks);
+  if (!pauses) spdlog::warn("job {} waits for {}", farm.history.name_of(lease.job), waits);
   BATON_TRY(farm.step(SpaceLacking{worker, lease, waits}));
-  return stays ? farm.step(JobPaused{lease.job, waits}) : Status();
+  return pauses ? farm.step(JobPaused{lease.job, waits}) : Status();
 }
 
 }  // namespace
@@ -280,8 +278,8 @@ void Service::keep_notes(const TaskDone& report) {
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
   // What no worker could write is nobody's failure.
-  const std::optional<std::string> hindrance =
-      message.no_space ? "space" : find_hindrance(farm_, message.lease);
+  const std::optional<Hindrance> hindrance =
+      message.no_space ? Hindrance{"space"} : find_hindrance(farm_, message.lease);
   if (!hindrance && await_inputs(worker, message)) return {};
   BATON_TRY(farm_.reply_to(worker, ReportReceived{message.lease}));
   if (hindrance) return wait_for_disk(farm_, worker, message.lease, *hindrance, message.message);

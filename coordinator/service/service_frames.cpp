@@ -45,9 +45,8 @@ Status Service::keep_frame_file(const TaskDone& report, const ReportedFrame& fra
   files_.add({frame.path, stamp, frame.digest, {}, report.lease.job.hex()});
   BATON_TRY(farm_.journal.record_given_up(farm_.history.jobs().of(report.lease.job).id,
                                           frame.path.filename().string(), std::nullopt));
-  const FrameIndex index = report.lease.task.frame();
-  return farm_.journal.record_frame_file(report.lease.job, index,
-                                         FrameFile{index, frame.digest, stamp});
+  return farm_.journal.record_frame_file(report.lease.job, report.lease.task.frame(),
+                                         FrameFile{frame.digest, stamp});
 }
 
 /// A job whose output folder is another one than that which was marked is paused: what is missing

@@ -122,12 +122,10 @@ Status Service::restore_job(const Digest& digest) {
   // job waits to be resumed.
   bool lacks_mark = false;
   if (is_open(event.status)) {
-    BATON_ASSIGN(const std::vector<FrameFile> stood, farm_.journal.frame_files(digest));
-    for (const FrameFile& file : stood) {
-      const bool is_known = file.digest != Digest() && file.frame >= FrameIndex(0) &&
-                            file.frame.index() < event.spec.frames.size();
-      if (is_known)
-        files_.add({frame_path(event.spec, file.frame), file.stamp, file.digest, {}, digest.hex()});
+    BATON_ASSIGN(const auto stood, farm_.journal.frame_files(digest));
+    for (const auto& [frame, file] : stood) {
+      if (file.digest != Digest() && frame.index() < event.spec.frames.size())
+        files_.add({frame_path(event.spec, frame), file.stamp, file.digest, {}, digest.hex()});
     }
     LostFiles lost = find_lost_files(event, farm_.store, files_, farm_.locked(digest, event.spec));
     while (lost.unreadable && std::chrono::steady_clock::now() < patient_until_) {
@@ -369,8 +367,8 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   if (is_away) return answer_detail(peer, *job);
   if (message.off && !is_open_now && fault.empty()) {
     // Behind a lock a frame may be of another picture.
-    const Status room = Submission(farm_, files_, speaker_).expect_room(*document);
-    if (!room) fault = room.error().message;
+    const Status is_free = Submission(farm_, files_, speaker_).expect_free_folder(*document);
+    if (!is_free) fault = is_free.error().message;
   }
   BATON_ASSIGN(const bool ends_again, farm_.ended_by_frames(*job, fault, message.off));
   if (ends_again && fault.empty())

@@ -74,7 +74,7 @@ Result<JobId> Submission::known_job(const ParsedJobDocument& document) {
   return same == namesakes.rend() ? JobId() : known.of(*same).id;
 }
 
-Status Submission::expect_room(const ParsedJobDocument& document) {
+Status Submission::expect_free_folder(const ParsedJobDocument& document) {
   BATON_ASSIGN(const JobId id, known_job(document));
   const Result<std::vector<Neighbour>> others = find_neighbours(document, id, false);
   return others ? Status() : Status(others.error());
@@ -371,13 +371,11 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
                                   frame_path(document.job, frame).string()));
   }
   if (num_gone > kMost) reasons.push_back(fmt::format("and {} frames more", num_gone - kMost));
-  // Locked frames are of no renderer: nobody reads or writes them.
-  const bool has_rendered =
-      !formers.empty() && std::ranges::any_of(adoption.frames, [&](const Completion& frame) {
-        return !locked.contains(frame.task.frame());
-      });
-  if (adoption.former) heritage.renderer = formers[*adoption.former].renderer;
-  if (!adoption.former && has_rendered && !farm_.options.mixed_builds) heritage.renderer = newest;
+  if (adoption.former) {
+    heritage.renderer = formers[*adoption.former].renderer;
+  } else if (!adoption.kept_of.empty() && !farm_.options.mixed_builds) {
+    heritage.renderer = newest;
+  }
   std::set<std::string> renderers;
   for (const std::size_t former : adoption.kept_of) {
     heritage.is_mixed = heritage.is_mixed || formers[former].is_mixed;

@@ -30,7 +30,7 @@ class Submission {
                 const std::vector<FramesInDoubt::Frame>& strange);
   /// Errors (bad_input, usage): why the document would be refused without --restart beside the jobs
   /// of its folder.
-  Status expect_room(const ParsedJobDocument& document);
+  Status expect_free_folder(const ParsedJobDocument& document);
   /// The job that the document is a version of, or becomes one; empty: a new one.
   Result<JobId> known_job(const ParsedJobDocument& document);
   /// A document of a job that may grow gets the sweeps that jobs of its picture have written in its

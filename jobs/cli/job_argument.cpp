@@ -73,21 +73,19 @@ std::string command_text(const JobArgument& argument) {
   return text;
 }
 
-Result<WantedJob> load_wanted(const JobArgument& argument, bool look) {
+Result<JobSpec> load_wanted(const JobArgument& argument, bool look) {
   const std::vector<JobOverride> overrides = overrides_of(argument);
   BATON_ASSIGN(JobSpec job, load_job(argument.file, overrides));
-  if (overrides.empty() && !look) return WantedJob{std::move(job)};
+  if (overrides.empty() && !look) return job;
 
-  // A folder that the options name is left to them.
   const Result<JobSpec> plain = load_job(argument.file);
   const bool changed = !plain || *plain != job;
   const bool own_folder = plain && plain->output.directory != job.output.directory;
-  WantedJob wanted{std::move(job), (look || changed) && !own_folder};
-  if (wanted.is_look) {
-    wanted.job.output.directory += "-look";
-    wanted.job.output.is_look = true;
+  if ((look || changed) && !own_folder) {
+    job.output.directory += "-look";
+    job.output.is_look = true;
   }
-  return wanted;
+  return job;
 }
 
 void add_from_frame_option(CLI::App& command, std::optional<FrameNumber>& frame) {
@@ -106,12 +104,12 @@ Status begin_at(JobSpec& job, std::optional<FrameNumber> frame) {
                fmt::format("--from-frame {}: the last frame of the job is {}", *frame, last)};
 }
 
-Result<WantedJob> load_settled(const JobArgument& argument, bool look) {
-  BATON_ASSIGN(WantedJob wanted, load_wanted(argument, look));
+Result<JobSpec> load_settled(const JobArgument& argument, bool look) {
+  BATON_ASSIGN(JobSpec job, load_wanted(argument, look));
   std::vector<std::string> left_out;
-  BATON_ASSIGN(wanted.job, settle_motion(std::move(wanted.job), &left_out));
+  BATON_ASSIGN(job, settle_motion(std::move(job), &left_out));
   for (const std::string& line : left_out) spdlog::warn("{}", line);
-  return wanted;
+  return job;
 }
 
 }  // namespace baton

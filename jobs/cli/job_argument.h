@@ -29,15 +29,11 @@ std::vector<JobOverride> overrides_of(const JobArgument& argument);
 /// The argument as it is typed, for a shell.
 std::string command_text(const JobArgument& argument);
 
-/// A job with the changes of a command line; motion is not settled.
-struct WantedJob {
-  JobSpec job;
-  /// It is not what its file says: its frames go to a folder of their own (`-look` behind its
-  /// name), and it is a look (OutputSpec::is_look).
-  bool is_look = false;
-};
-/// Reads the file. `look`: a look even if the options change nothing. Errors: load_job's.
-Result<WantedJob> load_wanted(const JobArgument& argument, bool look = false);
+/// The job with the changes of a command line; motion is not settled. One that is not what its file
+/// says is a look (OutputSpec::is_look), and its frames go to a folder of their own (`-look` behind
+/// its name), but for a folder that the options name. `look`: even if the options change nothing.
+/// Errors: load_job's.
+Result<JobSpec> load_wanted(const JobArgument& argument, bool look = false);
 
 /// Adds --from-frame; frame: none, where it is not given.
 void add_from_frame_option(CLI::App& command, std::optional<FrameNumber>& frame);
@@ -46,6 +42,6 @@ void add_from_frame_option(CLI::App& command, std::optional<FrameNumber>& frame)
 Status begin_at(JobSpec& job, std::optional<FrameNumber> frame);
 
 /// The same with settled motion, for what is rendered or estimated.
-Result<WantedJob> load_settled(const JobArgument& argument, bool look = false);
+Result<JobSpec> load_settled(const JobArgument& argument, bool look = false);
 
 }  // namespace baton

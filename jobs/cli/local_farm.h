@@ -30,9 +30,8 @@ struct FarmOptions {
 };
 
 /// A coordinator and workers on this machine, as child processes, at an address of their own that
-/// only this user reaches. A
-/// program that dies is started again: the coordinator goes on from its journal on the same
-/// endpoint, a worker's lost work is done again.
+/// only this user reaches. A program that dies is started again: the coordinator goes on from its
+/// journal on the same endpoint, a worker's lost work is done again.
 class LocalFarm {
  public:
   /// Starts everything and waits until the coordinator listens. Errors: the work directory cannot

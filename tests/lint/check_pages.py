@@ -74,10 +74,29 @@ def length_faults(root):
         yield f"ARCHITECTURE.md: {words_of(architecture)} words, at most {ARCHITECTURE_WORDS}"
 
 
+# Numbers of the code that pages say: page, what is said, source, what it is there.
+SAID = [
+    ("common/protocol/PROTOCOL.md", r"version is (\d+)", "common/protocol/messages.h", r"kProtocolVersion = (\d+)"),
+    ("CHANGELOG.md", r"Protocol (\d+)", "common/protocol/messages.h", r"kProtocolVersion = (\d+)"),
+    ("CHANGELOG.md", r"journal (\d+)", "coordinator/journal/schema.h", r"kSchemaVersion = (\d+)"),
+]
+
+
+def number_faults(root):
+    """Yields which pages say another number than the code."""
+    for page, said, source, meant in SAID:
+        if not ((root / page).exists() and (root / source).exists()):
+            continue
+        says = re.search(said, (root / page).read_text(encoding="utf-8"))
+        is_in = re.search(meant, (root / source).read_text(encoding="utf-8"))
+        if not (says and is_in and says[1] == is_in[1]):
+            yield f"{page}: says {says[0] if says else 'nothing'}, {source} {is_in[0] if is_in else 'nothing'}"
+
+
 def faults(root):
     root = root.resolve()
     linked = {*tables.pages(root), *(page for folder in FOLDERS for page in (root / folder).rglob("*.md"))}
-    found = [*tables.faults(root), *length_faults(root)]
+    found = [*tables.faults(root), *length_faults(root), *number_faults(root)]
     for page in sorted(linked):
         found += [*link_faults(root, page), *file_faults(root, page)]
     return found
@@ -106,6 +125,8 @@ TREE = {
         "makers": {"clock": {"by hand": "a clock", "takes": "", "writes": ["docs/lab/tables/times.csv"], "measures": ["docs"]}},
         "tables": {"times": {"pages": ["docs/page.md"]}}}),
     "ARCHITECTURE.md": "# How it is built\n",
+    "common/protocol/PROTOCOL.md": "# The protocol\n\nversion is 7\n",
+    "common/protocol/messages.h": "kProtocolVersion = 7;\n",
 }
 # A planted fault: file, what is replaced, by what, and what the message must contain.
 PLANTED = [
@@ -121,6 +142,7 @@ PLANTED = [
     ("docs/page.md", "#the-other", "#the-end", "no heading of that name"),
     ("docs/page.md", "# A page\n", "# A page\n" + "word " * (PAGE_WORDS + 1), f"words, at most {PAGE_WORDS}"),
     ("ARCHITECTURE.md", "# How", "word " * ARCHITECTURE_WORDS + "# How", f"at most {ARCHITECTURE_WORDS}"),
+    ("common/protocol/messages.h", "= 7", "= 8", "says version is 7"),
     ("jobs/lab/manifest.json", '"measures": ["docs"]', '"measures": ["gone"]', "names gone, which is not there"),
     ("jobs/lab/manifest.json", '"docs/page.md"', '"docs/lab/other.md"', "says it is on"),
     ("jobs/lab/manifest.json", '"docs/lab/tables/times.csv"], "measures"', '"docs/lab/made.csv"], "measures"', "no entry makes"),

@@ -85,6 +85,23 @@ def what_is_seen_late_is_not_made_again(programs, folder):
     check_equal(programs.pixels(folder / "frames"), expected, "pixels")
 
 
+def a_file_in_place_of_the_store_is_waited_for(programs, folder):
+    expected = programs.rendered(folder / "witness", moving(folder / "witness"))
+    with Farm(programs, folder / "farm", workers=1) as farm:
+        ident = farm.submit(write_job(folder / "job.json", moving(folder)))
+        wait_until(lambda: farm.show(ident)["framesDone"] >= 1, "a frame is done")
+        store = folder / "farm/work/store"
+        away = store.rename(store.with_name("away"))
+        store.write_text("no folder", encoding="ascii")
+        wait_until(lambda: "a folder in the place of" in farm.show(ident).get("waits", ""), "it waits")
+        store.unlink()
+        away.rename(store)
+        farm.start_worker()
+        farm.wait_for(ident)
+        check_equal(farm.show(ident)["failures"], [], "failures")
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
 def an_input_that_changes_reaches_no_frame_in_silence(programs, folder):
     """A plate and a map are read when a frame needs them, by a worker that has loaded the job before. By then they may be
     others than those that were submitted."""

@@ -2,6 +2,7 @@
 """`baton job submit|list|show|wait|cancel` against a live coordinator, and what they say when there is none."""
 
 import json
+import re
 import time
 
 from farm import BAD_INPUT, FAILED, OK, PATIENCE, UNAVAILABLE, Farm, Process, check, check_equal, free_port, run_tests, wait_until
@@ -188,12 +189,13 @@ def a_task_that_takes_too_long_fails(programs, folder):
         endless = {"method": "reference", "referenceSamples": 1 << 24}
         job = farm.submit(small_job(folder, sampling=endless, state={"carry": False}, maxSecondsPerTask=1,
                                     maxRetriesPerTask=0))
-        farm.start_worker()
+        worker = farm.start_worker()
         farm.baton("job", "wait", job, expect=FAILED)
         shown = farm.show(job)
         check_equal((shown["tasksFailed"], shown["attemptsLost"]), (1, 1), "failures")
         words = "ran for longer than maxSecondsPerTask"
         check(words in shown["failures"][0] and words in farm.coordinator.log(), "the reason is not named")
+        check(re.search(rf"job {job[:8]}: frames? [\d-]+, tile \d+ failed: {words}", worker.log()), worker.log())
         wait_until(lambda: [file.stem for file in saved_jobs(farm)] == [shown["document"]], "the failed job's document stays")
 
 

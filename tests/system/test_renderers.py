@@ -211,6 +211,29 @@ def what_unlike_renderers_made_is_not_compared(programs, folder):
     check_equal(len({renderer_of(frame) for frame in (folder / "frames").glob("*.exr")}), 1, "renderers of the frames")
 
 
+def what_one_renders_anew_is_mixed_no_more(programs, folder):
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    small = {"sampling": {"numCandidates": 128}}
+    with Farm(programs, folder / "farm", workers=None) as farm:
+        farm.start_coordinator(extra=("--mixed-builds",))
+        first = farm.start_worker(extra=("--isa", sets[-1]))
+        ident = farm.submit(make(folder, **small))
+        wait_until(lambda: farm.show(ident)["framesDone"] >= 2, "two frames are done")
+        first.kill()
+        farm.start_worker(extra=("--isa", sets[0]))
+        farm.wait_for(ident)
+        farm.coordinator.kill()
+        farm.start_coordinator()
+        anew = {**small, "output": {"aovs": ["normal"]}}
+        check_says(farm.baton("job", "submit", make(folder, **anew)).stderr, "frames are written anew: output.aovs has changed")
+        farm.wait_for(ident)
+        farm.submit(make(folder, frames=f"1-{FRAMES + 2}", **anew))
+        farm.wait_for(ident)
+    check_equal(len({renderer_of(frame) for frame in (folder / "frames").glob("*.exr")}), 1, "renderers of the frames")
+
+
 def the_one_command_says_so(programs, folder):
     sets = sets_of(programs)
     if len(sets) < 2:

@@ -235,10 +235,10 @@ Status write_preview(const CheckOptions& options, const JobSpec& job, const Scen
 }
 
 Result<ExitCode> run_check(const CheckOptions& options) {
-  BATON_ASSIGN(const WantedJob wanted, load_wanted(options.job));
+  BATON_ASSIGN(const JobSpec wanted, load_wanted(options.job));
   std::vector<std::string> left_out;
-  const Result<JobSpec> settled = settle_motion(wanted.job, &left_out);
-  const JobSpec& job = settled ? *settled : wanted.job;
+  const Result<JobSpec> settled = settle_motion(wanted, &left_out);
+  const JobSpec& job = settled ? *settled : wanted;
   BATON_ASSIGN(const AssetReport assets, load_assets(job));  // lists the faults of all files
   if (!settled) return settled.error();
   std::vector<JobSetting> settings;
@@ -247,7 +247,7 @@ Result<ExitCode> run_check(const CheckOptions& options) {
   }
 
   const JobEstimate estimate = estimate_job(job);
-  const std::vector<AnimationUse> animations = animations_of(wanted.job);
+  const std::vector<AnimationUse> animations = animations_of(wanted);
   std::vector<std::string> warnings = job_warnings(job, assets);
   warnings.insert(warnings.end(), left_out.begin(), left_out.end());
   const PilotPlan plan =

@@ -112,14 +112,16 @@ Result<PilotJob> pilot_job(const FarmCommandOptions& options, const OpenFarm& fa
 
 /// Renders the job, or, without one, keeps the farm up for those that others submit.
 Result<ExitCode> work(RenderSession& session, const RenderOptions& options,
-                      const std::optional<WantedJob>& wanted,
+                      const std::optional<JobSpec>& wanted,
                       const std::function<void()>& tend_pilots) {
   if (!wanted) {
     BATON_TRY(session.keep_running(tend_pilots));
     return ExitCode::ok;
   }
+  if (wanted->output.is_look)
+    fmt::print(stderr, "a look: frames go to {}\n", wanted->output.directory);
   const bool restart = options.restart || options.from_frame;
-  BATON_ASSIGN(const std::optional<JobStatus> status, session.render(wanted->job, restart, [&] {
+  BATON_ASSIGN(const std::optional<JobStatus> status, session.render(*wanted, restart, [&] {
     tend_pilots();
     return false;
   }));
@@ -132,15 +134,15 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
   const RenderOptions& render = options.render;
   BATON_ASSIGN(const NodeRange nodes, parse_node_range(options.nodes));
   if (!options.time.empty()) BATON_TRY(parse_walltime(options.time));
-  std::optional<WantedJob> wanted;
+  std::optional<JobSpec> wanted;
   if (!render.job.file.empty()) {
     BATON_ASSIGN(wanted, load_settled(render.job));
-    BATON_TRY(begin_at(wanted->job, render.from_frame));
+    BATON_TRY(begin_at(*wanted, render.from_frame));
   } else if (render.work_directory.empty()) {
     return Error{ErrorKind::usage, "without a JOB, say --work-dir"};
   }
-  const FarmOptions local = farm_options(render, wanted ? wanted->job : JobSpec());
-  if (wanted) BATON_TRY(settle_method(wanted->job, local));
+  const FarmOptions local = farm_options(render, wanted.value_or(JobSpec()));
+  if (wanted) BATON_TRY(settle_method(*wanted, local));
 
   const SignalWait signals;
   BATON_ASSIGN(OpenFarm open,

@@ -59,8 +59,7 @@ void print_accepted(const JobAccepted& accepted, bool json) {
 }
 
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(WantedJob wanted, load_settled(options.wanted));
-  JobSpec& job = wanted.job;
+  BATON_ASSIGN(JobSpec job, load_settled(options.wanted));
   BATON_TRY(begin_at(job, options.from_frame));
   // A pilot takes its time: first see that there is somebody to submit to.
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
@@ -71,7 +70,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
                ask_until_done<JobAccepted>(client, SubmitJob{std::move(document), restart}));
   print_accepted(accepted, options.json);
   if (options.json) return ExitCode::ok;
-  if (wanted.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
+  if (job.output.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
   if (job.quality.may_grow())
     fmt::print(stderr, "rounds are added until quality.{} ends it\n",
                job.quality.noise_threshold ? "noiseThreshold"

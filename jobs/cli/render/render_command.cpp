@@ -20,11 +20,10 @@ ExitCode exit_code_of(const JobSpec& job, JobStatus status) {
 }
 
 Result<ExitCode> run_render(const RenderOptions& options) {
-  BATON_ASSIGN(WantedJob wanted, load_settled(options.job));
-  JobSpec& job = wanted.job;
+  BATON_ASSIGN(JobSpec job, load_settled(options.job));
   BATON_TRY(begin_at(job, options.from_frame));
   BATON_TRY(check_out(options, job));
-  if (wanted.is_look) spdlog::info("a look: frames go to {}", job.output.directory);
+  if (job.output.is_look) spdlog::info("a look: frames go to {}", job.output.directory);
   const FarmOptions farm = farm_options(options, job);
   BATON_TRY(settle_method(job, farm));
 

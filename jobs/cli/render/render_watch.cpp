@@ -49,17 +49,17 @@ Result<std::optional<JobStatus>> render_twice(RenderSession& session, const JobS
 }  // namespace
 
 std::string watched_state(const JobArgument& argument) {
-  const Result<WantedJob> wanted = load_wanted(argument);
+  const Result<JobSpec> wanted = load_wanted(argument);
   if (!wanted) return wanted.error().message;
-  std::string state = to_json(wanted->job);
-  for (const std::string& file : watched_files(wanted->job)) state += stamp(file);
+  std::string state = to_json(*wanted);
+  for (const std::string& file : watched_files(*wanted)) state += stamp(file);
   return state;
 }
 
 Result<ExitCode> watch_and_render(const RenderOptions& options) {
-  BATON_ASSIGN(WantedJob wanted, load_settled(options.job, true));
-  BATON_TRY(check_out(options, wanted.job));
-  const FarmOptions farm = farm_options(options, wanted.job);
+  BATON_ASSIGN(const JobSpec wanted, load_settled(options.job, true));
+  BATON_TRY(check_out(options, wanted));
+  const FarmOptions farm = farm_options(options, wanted);
   const SignalWait signals;
   BATON_ASSIGN(RenderSession session, RenderSession::start(options, farm, signals));
   bool stop = false;
@@ -70,12 +70,12 @@ Result<ExitCode> watch_and_render(const RenderOptions& options) {
       changed = changed || watched_state(options.job) != state;
       return changed;
     };
-    Result<WantedJob> version = load_settled(options.job, true);
-    Status outcome = version ? check_out(options, version->job) : Status(version.error());
-    if (outcome.ok()) outcome = settle_method(version->job, farm);
+    Result<JobSpec> version = load_settled(options.job, true);
+    Status outcome = version ? check_out(options, *version) : Status(version.error());
+    if (outcome.ok()) outcome = settle_method(*version, farm);
     if (outcome.ok()) {
-      spdlog::info("a look: frames go to {}", version->job.output.directory);
-      const auto rendered = render_twice(session, version->job, options.restart, interrupted);
+      spdlog::info("a look: frames go to {}", version->output.directory);
+      const auto rendered = render_twice(session, *version, options.restart, interrupted);
       if (!rendered) outcome = rendered.error();
       stop = rendered && !*rendered && !changed;
     }

@@ -97,6 +97,7 @@ TEST(Quality, SweepsAreDoubledUntilNoiseTimeOrRoundsEndThem) {
   EXPECT_EQ(next_sweeps(quality, 0, 8, 4), 5) << "a sweep takes 2 s";
   EXPECT_EQ(next_sweeps(quality, 0, 9, 4), 4);
   EXPECT_EQ(next_sweeps(quality, 0, 30, 4), 4) << "never fewer";
+  EXPECT_EQ(next_sweeps(quality, 0, -86400, 4), 4) << "the clock was set back";
 }
 
 TEST(Quality, RoundsAndPrerollChangeThePicture) {

@@ -60,6 +60,27 @@ TEST_F(JournalTest, EveryStartIsCounted) {
   EXPECT_EQ(open().epoch(), 2u);
 }
 
+// Once granted, a frame may be there, whatever becomes of its job, until it is known not to be.
+TEST_F(JournalTest, WhatWasGrantedIsKnownInTheArchiveAndAfterABeginning) {
+  Journal journal = open();
+  ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+  for (const int frame : {0, 1})
+    ASSERT_TRUE(journal.record_frame_file(kJob, FrameIndex(frame), FrameFile{}).ok());
+  ASSERT_TRUE(
+      journal.record_frame_file(kJob, FrameIndex(1), FrameFile{digest_of("1"), {1, 2, 3}}).ok());
+  ASSERT_TRUE(journal.archive_job(kJob, {std::byte{1}}, {std::byte{2}}, {}).ok());
+  for (const bool begins_again : {false, true}) {
+    if (begins_again) {
+      ASSERT_TRUE(journal.restart_job(kJob).ok());
+    }
+    const auto files = journal.frame_files(kJob).value();
+    ASSERT_EQ(files.size(), 2u);
+    EXPECT_EQ(files.at(FrameIndex(1)).digest, Digest()) << "how it stands is forgotten";
+  }
+  ASSERT_TRUE(journal.record_frame_file(kJob, FrameIndex(1), std::nullopt).ok());
+  EXPECT_EQ(journal.frame_files(kJob).value().size(), 1u);
+}
+
 // More than go into one piece of the archive.
 TEST_F(JournalTest, AJobOfManyTasksIsArchivedOnce) {
   constexpr std::int32_t kTiles = 9000;
@@ -294,25 +315,22 @@ TEST_F(JournalTest, TablesThatCameLaterAreMadeWhenTheyAreMissing) {
     for (const char* const table : {"frame_files", "output_marks"})
       ASSERT_TRUE(database.execute(std::string("DROP TABLE ") + table).ok());
   }
-  const FrameFile file{FrameIndex(3), digest_of("frame"), {100, 7, 123456789}};
+  const FrameIndex frame(3);
+  const FrameFile file{digest_of("frame"), {100, 7, 123456789}};
   {
     Journal journal = open();
     EXPECT_EQ(journal.jobs().value().size(), 1u) << "the job goes on";
     EXPECT_TRUE(journal.frame_files(kJob).value().empty());
-    ASSERT_TRUE(
-        journal
-            .record_frame_file(kJob, FrameIndex(3), FrameFile{FrameIndex(3), digest_of("old"), {}})
-            .ok());
-    ASSERT_TRUE(journal.record_frame_file(kJob, file.frame, file).ok());
+    ASSERT_TRUE(journal.record_frame_file(kJob, frame, FrameFile{digest_of("old"), {}}).ok());
+    ASSERT_TRUE(journal.record_frame_file(kJob, frame, file).ok());
     ASSERT_TRUE(journal.record_output_mark(kJob, "/frames").ok());
     ASSERT_TRUE(journal.commit().ok());
   }
   Journal journal = open();
-  const std::vector<FrameFile> files = journal.frame_files(kJob).value();
+  const auto files = journal.frame_files(kJob).value();
   ASSERT_EQ(files.size(), 1u);
-  EXPECT_EQ(files[0].frame, file.frame);
-  EXPECT_EQ(files[0].digest, file.digest);
-  EXPECT_EQ(files[0].stamp, file.stamp);
+  EXPECT_EQ(files.at(frame).digest, file.digest);
+  EXPECT_EQ(files.at(frame).stamp, file.stamp);
   EXPECT_EQ(journal.output_marks().value(), std::set<Digest>{kJob});
   ASSERT_TRUE(journal.delete_job(kJob).ok());
   EXPECT_TRUE(journal.frame_files(kJob).value().empty());

@@ -56,6 +56,16 @@ struct FramesTest : ServiceTest {
     sync(worker);
     return id;
   }
+  /// Submits the job as it was before: of another priority. Its digest.
+  Digest submit_former(const std::string& endpoint) {
+    JobSpec former = job;
+    former.priority = 7;
+    return ask<JobAccepted>(endpoint, SubmitJob{make_job_document(former).value()}).version;
+  }
+  /// The writer of its frames, as the worker of this build that rendered them has it.
+  static std::string writer_of(const Digest& version) {
+    return version.hex() + " TEST, " + build_identity();
+  }
   /// Does what there is until it has the assembly of frame 2, which it does not do.
   LeaseId wait_for_frame_2(FakeWorker& worker) {
     for (int i = 0; i < 20; ++i) {

@@ -83,12 +83,9 @@ TEST_F(FramesTest, ThePictureOfSomebodyElseIsKeptAndTheJobFails) {
 // Its worker was late: the header names a job that has not reported the frame.
 TEST_F(FramesTest, ThePictureOfAFormerJobOfTheFolderIsMadeAgain) {
   const RunningService service(options);
-  JobSpec urgent = job;
-  urgent.priority = 7;
-  const Digest former =
-      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).version;
+  const Digest former = submit_former(service.endpoint());
   FakeWorker worker(service.endpoint(), store(), job),
-      late(service.endpoint(), store(), urgent, "late");
+      late(service.endpoint(), store(), job, "late");
   late.hello();
   wait_for_frame_2(late);
   const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
@@ -97,7 +94,7 @@ TEST_F(FramesTest, ThePictureOfAFormerJobOfTheFolderIsMadeAgain) {
     worker.do_one_task();
     sync(worker);
   }
-  put(2, std::string(kPicture) + former.hex() + " TEST, " + build_identity());
+  put(2, std::string(kPicture) + writer_of(former));
   EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
   EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
 }

@@ -107,21 +107,17 @@ TEST_F(PlaceTest, OnceItIsGoneTheFrameIsMade) {
   EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
 }
 
-// A worker of a former version was late.
-// Once a worker was granted the frame it may have written it, reported or not.
+// Once a worker was granted a frame it may have written it, and be late to report it.
 TEST_F(PlaceTest, WhatAFormerJobHasLeftMayGo) {
   const RunningService service(options);
-  JobSpec urgent = job;
-  urgent.priority = 7;
-  const Digest former =
-      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).version;
+  const Digest former = submit_former(service.endpoint());
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   wait_for_frame_2(worker);
   const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   put(2, picture);
   const LeaseId lease = wait_for_frame_2(worker);
-  say_taken(worker, lease, former.hex() + " TEST, " + build_identity());
+  say_taken(worker, lease, writer_of(former));
   const LeaseId again = wait_for_frame_2(worker);
   EXPECT_NE(again, lease);
   EXPECT_THAT(granted, ElementsAre(digest_of(picture)));
@@ -131,15 +127,12 @@ TEST_F(PlaceTest, WhatAFormerJobHasLeftMayGo) {
 
 TEST_F(PlaceTest, WhatNobodyWasGrantedIsNoFormerJobs) {
   const RunningService service(options);
-  JobSpec urgent = job;
-  urgent.priority = 7;
-  const Digest former =
-      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).version;
+  const Digest former = submit_former(service.endpoint());
   const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   put(2, picture);
-  say_taken(worker, wait_for_frame_2(worker), former.hex() + " TEST, " + build_identity());
+  say_taken(worker, wait_for_frame_2(worker), writer_of(former));
   EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::failed);
 }
 
