@@ -299,6 +299,7 @@ Status Journal::delete_job(const Digest& job) {
   BATON_TRY(change("DELETE FROM growth WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM priorities WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM locked_frames WHERE id NOT IN (SELECT id FROM versions)"));
+  BATON_TRY(change("DELETE FROM lock_times WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM pictures_given_up WHERE id NOT IN (SELECT id FROM versions)"));
   return change("DELETE FROM identities WHERE id NOT IN (SELECT id FROM versions)");
 }

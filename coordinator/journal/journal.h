@@ -64,6 +64,14 @@ struct PriorityChange {
   std::int32_t written = 0, wanted = 0;
 };
 
+/// The frames of a job that count as done whatever is in their files.
+struct JobLocks {
+  std::set<FrameNumber> frames = {};
+  /// When one was last locked or unlocked, milliseconds by UTC; 0: not known. It grows with each
+  /// change, whatever the clock says.
+  std::int64_t changed_ms = 0;
+};
+
 /// By what a job is found.
 struct JobIndex {
   std::string name;
@@ -181,9 +189,9 @@ class Journal {
   /// number.
   Result<std::int32_t> record_version(const Digest& document, const JobId& id);
   Status record_times(const JobId& id, const JobTimes& times);
-  /// Frames that count as done whatever is in their files.
-  Result<std::map<JobId, std::set<FrameNumber>>> locked_frames();
-  Status record_lock(const JobId& id, FrameNumber frame, bool is_locked);
+  Result<std::map<JobId, JobLocks>> locks();
+  /// changed_ms: as in JobLocks.
+  Status record_lock(const JobId& id, FrameNumber frame, bool is_locked, std::int64_t changed_ms);
   /// Of the jobs of which somebody has set it.
   Result<std::map<JobId, PriorityChange>> priorities();
   Status record_priority(const JobId& id, const PriorityChange& priority);

@@ -63,18 +63,27 @@ Status Journal::record_times(const JobId& id, const JobTimes& times) {
                 times.submitted_ms, times.started_ms, times.ended_ms, id.hex());
 }
 
-Result<std::map<JobId, std::set<FrameNumber>>> Journal::locked_frames() {
-  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT id, frame FROM locked_frames"));
-  std::map<JobId, std::set<FrameNumber>> locked;
-  while (true) {
-    BATON_ASSIGN(const bool row, query.step());
-    if (!row) return locked;
-    if (const std::optional<JobId> id = JobId::from_hex(query.text(0)))
-      locked[*id].insert(FrameNumber(static_cast<std::int32_t>(query.integer(1))));
+Result<std::map<JobId, JobLocks>> Journal::locks() {
+  std::map<JobId, JobLocks> locks;
+  BATON_ASSIGN(SqlStatement frames, database_.prepare("SELECT id, frame FROM locked_frames"));
+  for (bool row = true; row;) {
+    BATON_ASSIGN(row, frames.step());
+    if (const auto id = row ? JobId::from_hex(frames.text(0)) : std::nullopt)
+      locks[*id].frames.insert(FrameNumber(static_cast<std::int32_t>(frames.integer(1))));
   }
+  BATON_ASSIGN(SqlStatement times, database_.prepare("SELECT id, changed_ms FROM lock_times"));
+  for (bool row = true; row;) {
+    BATON_ASSIGN(row, times.step());
+    if (const auto id = row ? JobId::from_hex(times.text(0)) : std::nullopt)
+      locks[*id].changed_ms = times.integer(1);
+  }
+  return locks;
 }
 
-Status Journal::record_lock(const JobId& id, FrameNumber frame, bool is_locked) {
+Status Journal::record_lock(const JobId& id, FrameNumber frame, bool is_locked,
+                            std::int64_t changed_ms) {
+  BATON_TRY(change("INSERT OR REPLACE INTO lock_times (id, changed_ms) VALUES (?, ?)", id.hex(),
+                   changed_ms));
   return change(is_locked ? "INSERT OR IGNORE INTO locked_frames (id, frame) VALUES (?, ?)"
                           : "DELETE FROM locked_frames WHERE id = ? AND frame = ?",
                 id.hex(), std::int64_t{frame.value()});

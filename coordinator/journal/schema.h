@@ -76,7 +76,8 @@ inline constexpr const char* kSchema = R"sql(
 /// are done, the last ones of `mixed_jobs`; `former_renderers`: by what those that are forgotten,
 /// empty where they were mixed. Where other tables say `job`, they mean the digest of a document: a
 /// version. `versions` says of which job (JobId) it is the n-th, `identities` when what happened to
-/// that job, `locked_frames` which of its frames count as done whatever is in their files,
+/// that job, `locked_frames` which of its frames count as done whatever is in their files and
+/// `lock_times` when that last changed,
 /// `priorities` which priority a person has set in place of the one that is written in its
 /// document, `growth` how it has come by its sweeps. `pictures_given_up` are those that a job may
 /// replace though no job has written them; `marked_folders` what output folders were, without
@@ -112,6 +113,8 @@ inline constexpr const char* kLaterTables = R"sql(
     id TEXT PRIMARY KEY, written INTEGER NOT NULL, wanted INTEGER NOT NULL) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS locked_frames (
     id TEXT NOT NULL, frame INTEGER NOT NULL, PRIMARY KEY (id, frame)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS lock_times (
+    id TEXT PRIMARY KEY, changed_ms INTEGER NOT NULL) WITHOUT ROWID;
   DROP TABLE IF EXISTS given_up;
   CREATE TABLE IF NOT EXISTS pictures_given_up (
     id TEXT NOT NULL, file TEXT NOT NULL, digest TEXT NOT NULL,

@@ -101,12 +101,12 @@ Status History::deleted(const Digest& version) {
 }
 
 Status History::locked(const Digest& version, const std::vector<FrameNumber>& frames,
-                       bool is_locked) {
+                       bool is_locked, std::int64_t changed_ms, const std::string& why) {
   const JobId job = jobs_.of(version).id;
-  BATON_TRY(jobs_.set_locked(journal_, job, frames, is_locked));
+  BATON_TRY(jobs_.set_locked(journal_, job, frames, is_locked, changed_ms));
   return tell({.kind = is_locked ? FarmEventKind::frames_locked : FarmEventKind::frames_unlocked,
                .job = job,
-               .reason = "frames " + format_frames(frames)});
+               .reason = "frames " + format_frames(frames) + why});
 }
 
 Status History::prioritized(const Digest& version, std::int32_t before,

@@ -32,8 +32,10 @@ class History {
   Status submitted(const Digest& document, const JobId& job, const std::string& reason);
   Status status_changed(const Digest& version, JobStatus status, const std::string& reason);
   Status deleted(const Digest& version);
-  /// Frames of the job count as done from now on, or no longer.
-  Status locked(const Digest& version, const std::vector<FrameNumber>& frames, bool is_locked);
+  /// Frames of the job count as done from now on, or no longer. changed_ms: since when (JobLocks);
+  /// why: what is said of that.
+  Status locked(const Digest& version, const std::vector<FrameNumber>& frames, bool is_locked,
+                std::int64_t changed_ms, const std::string& why = {});
   /// The job has another priority from now on. before: the one it had; why: what is said of that.
   Status prioritized(const Digest& version, std::int32_t before, const PriorityChange& priority,
                      const std::string& why = {});

@@ -14,10 +14,10 @@ Result<IdentityBook> IdentityBook::read(Journal& journal) {
     const auto job = book.jobs_.find(id);
     if (job != book.jobs_.end()) job->second.times = of_job;
   }
-  BATON_ASSIGN(const auto locked, journal.locked_frames());
-  for (const auto& [id, frames] : locked) {
+  BATON_ASSIGN(const auto locks, journal.locks());
+  for (const auto& [id, of_job] : locks) {
     const auto job = book.jobs_.find(id);
-    if (job != book.jobs_.end()) job->second.locked = frames;
+    if (job != book.jobs_.end()) job->second.locks = of_job;
   }
   BATON_ASSIGN(const auto priorities, journal.priorities());
   for (const auto& [id, priority] : priorities) {
@@ -35,15 +35,19 @@ JobIdentity IdentityBook::of(const Digest& document) const {
 }
 
 std::vector<FrameNumber> IdentityBook::locked(const JobId& job) const {
+  const std::set<FrameNumber> frames = locks(job).frames;
+  return {frames.begin(), frames.end()};
+}
+
+JobLocks IdentityBook::locks(const JobId& job) const {
   const auto found = jobs_.find(job);
-  if (found == jobs_.end()) return {};
-  return {found->second.locked.begin(), found->second.locked.end()};
+  return found == jobs_.end() ? JobLocks() : found->second.locks;
 }
 
 std::vector<JobId> IdentityBook::with_locks() const {
   std::vector<JobId> ids;
   for (const auto& [id, job] : jobs_) {
-    if (!job.locked.empty()) ids.push_back(id);
+    if (!job.locks.frames.empty()) ids.push_back(id);
   }
   return ids;
 }
@@ -89,13 +93,16 @@ Status IdentityBook::set_times(Journal& journal, const JobId& job, const JobTime
 }
 
 Status IdentityBook::set_locked(Journal& journal, const JobId& job,
-                                const std::vector<FrameNumber>& frames, bool is_locked) {
+                                const std::vector<FrameNumber>& frames, bool is_locked,
+                                std::int64_t changed_ms) {
   const auto found = jobs_.find(job);
   if (found == jobs_.end()) return {};
+  JobLocks& locks = found->second.locks;
+  locks.changed_ms = changed_ms;
   for (const FrameNumber frame : frames) {
-    BATON_TRY(journal.record_lock(job, frame, is_locked));
-    if (is_locked) found->second.locked.insert(frame);
-    if (!is_locked) found->second.locked.erase(frame);
+    BATON_TRY(journal.record_lock(job, frame, is_locked, changed_ms));
+    if (is_locked) locks.frames.insert(frame);
+    if (!is_locked) locks.frames.erase(frame);
   }
   return {};
 }

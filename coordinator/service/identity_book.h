@@ -22,6 +22,7 @@ class IdentityBook {
   /// Frames of a job that count as done, whatever is in their files; ascending. None where it is
   /// not known.
   std::vector<FrameNumber> locked(const JobId& job) const;
+  JobLocks locks(const JobId& job) const;
   /// Those that have locked frames.
   std::vector<JobId> with_locks() const;
   /// The priority of a job whose document says `written`.
@@ -35,9 +36,9 @@ class IdentityBook {
   Status add_version(Journal& journal, const Digest& document, const JobId& job);
   /// Replaces the times of a job that is known.
   Status set_times(Journal& journal, const JobId& job, const JobTimes& times);
-  /// The frames count as done from now on, or no longer.
+  /// The frames count as done from now on, or no longer. changed_ms: as in JobLocks.
   Status set_locked(Journal& journal, const JobId& job, const std::vector<FrameNumber>& frames,
-                    bool is_locked);
+                    bool is_locked, std::int64_t changed_ms);
   /// The job has this priority while its document says `written`.
   Status set_priority(Journal& journal, const JobId& job, const PriorityChange& priority);
   /// The job is forgotten here; the journal forgets it with its documents.
@@ -46,7 +47,7 @@ class IdentityBook {
  private:
   struct Job {
     JobTimes times;
-    std::set<FrameNumber> locked;
+    JobLocks locks;
     std::optional<PriorityChange> priority;
     std::map<std::int32_t, Digest> versions;
   };

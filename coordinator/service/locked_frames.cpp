@@ -9,6 +9,7 @@
 
 #include "common/base/file_stamp.h"
 #include "common/base/patiently.h"
+#include "common/base/utc.h"
 #include "common/job/file_sequence.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
@@ -80,28 +81,53 @@ std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNu
 
 namespace {
 
+/// Those that can be read.
+Result<std::vector<JobSpec>> specs_of(Journal& journal, const std::vector<Digest>& versions) {
+  std::vector<JobSpec> specs;
+  for (const Digest& version : versions) {
+    BATON_ASSIGN(const std::optional<std::string> text, journal.document(version));
+    Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+    if (document) specs.push_back(std::move(document->job));
+  }
+  return specs;
+}
+
 /// Under the names that they have in any of these versions.
 Result<std::set<std::string>> files_of_versions(Journal& journal,
                                                 const std::vector<Digest>& versions,
-                                                const std::vector<FrameNumber>& frames) {
+                                                const std::set<FrameNumber>& frames) {
   std::set<std::string> files;
   if (frames.empty()) return files;
-  for (const Digest& version : versions) {
-    BATON_ASSIGN(const std::optional<std::string> text, journal.document(version));
-    const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
-    if (document) files.merge(frame_files(document->job, frames));
-  }
+  BATON_ASSIGN(const std::vector<JobSpec> specs, specs_of(journal, versions));
+  for (const JobSpec& spec : specs) files.merge(frame_files(spec, {frames.begin(), frames.end()}));
   return files;
+}
+
+/// Frames of these versions that have files among those and are not locked; ascending.
+Result<std::vector<FrameNumber>> frames_not_locked(Journal& journal,
+                                                   const std::vector<Digest>& versions,
+                                                   const std::set<std::string>& files,
+                                                   const std::set<FrameNumber>& locked) {
+  std::set<FrameNumber> frames;
+  BATON_ASSIGN(const std::vector<JobSpec> specs, specs_of(journal, versions));
+  for (const JobSpec& spec : specs) {
+    for (const FrameNumber frame : spec.frames) {
+      if (!locked.contains(frame) &&
+          files.contains(frame_file_name(spec.output.pattern, frame.value())))
+        frames.insert(frame);
+    }
+  }
+  return std::vector<FrameNumber>(frames.begin(), frames.end());
 }
 
 }  // namespace
 
 Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Digest>& versions,
-                  const JobId& id, const std::vector<FrameNumber>& locked, const Roots& roots) {
+                  const JobId& id, const JobLocks& locks, const Roots& roots) {
   if (!check_output_root(spec, roots)) return {};
-  BATON_ASSIGN(std::set<std::string> files, files_of_versions(journal, versions, locked));
-  files.merge(frame_files(spec, locked));
-  BATON_TRY(record_locks(spec.output.directory, id.hex(), files));
+  BATON_ASSIGN(std::set<std::string> files, files_of_versions(journal, versions, locks.frames));
+  files.merge(frame_files(spec, {locks.frames.begin(), locks.frames.end()}));
+  BATON_TRY(record_locks(spec.output.directory, id.hex(), {files, locks.changed_ms}));
   // The folder's name may lead elsewhere tomorrow.
   const std::string today = resolve_folder(spec.output.directory);
   if (!files.empty() && !versions.empty())
@@ -117,27 +143,45 @@ Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Diges
 
 Status tell_locks_again(Journal& journal, const JobSpec& spec, const IdentityBook& jobs,
                         const JobId& id, const Roots& roots) {
-  const Status told = tell_locks(journal, spec, jobs.versions(id), id, jobs.locked(id), roots);
+  const Status told = tell_locks(journal, spec, jobs.versions(id), id, jobs.locks(id), roots);
   if (told || told.error().kind != ErrorKind::io) return told;
   spdlog::warn("other coordinators do not see which frames are locked: {}", told.error().message);
   return {};
 }
 
-Status drop_stale_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs) {
-  const auto locks = locks_of_others(spec.output.directory, {});
-  if (!locks) return {};
-  std::set<std::string> ids;
-  for (const auto& [file, job] : *locks) ids.insert(job);
-  for (const std::string& job : ids) {
+std::int64_t lock_time_ms(const IdentityBook& jobs, const JobId& id) {
+  return std::max(now_ms(), jobs.locks(id).changed_ms + 1);
+}
+
+Result<std::map<JobId, std::vector<FrameNumber>>> settle_locks(Journal& journal, History& history,
+                                                               const JobSpec& spec,
+                                                               const Roots& roots) {
+  std::map<JobId, std::vector<FrameNumber>> taken_up;
+  if (!check_output_root(spec, roots)) return taken_up;
+  const auto told = locks_by_job(spec.output.directory);
+  if (!told) return taken_up;
+  for (const auto& [job, in_folder] : *told) {
     const std::optional<JobId> id = JobId::from_hex(job);
-    const std::vector<Digest> versions = id ? jobs.versions(*id) : std::vector<Digest>();
+    const auto versions = id ? history.jobs().versions(*id) : std::vector<Digest>();
     if (versions.empty()) continue;
-    BATON_ASSIGN(const std::set<std::string> files,
-                 files_of_versions(journal, versions, jobs.locked(*id)));
-    if (const Status dropped = retain_locks(spec.output.directory, job, files); !dropped)
-      spdlog::warn("locks stay for other coordinators: {}", dropped.error().message);
+    const JobLocks known = history.jobs().locks(*id);
+    if (in_folder.changed_ms > known.changed_ms) {
+      BATON_ASSIGN(std::vector<FrameNumber> frames,
+                   frames_not_locked(journal, versions, in_folder.files, known.frames));
+      if (frames.empty()) continue;
+      const std::string why = fmt::format(", by {}, which is newer than the journal",
+                                          (lock_folder(spec.output.directory) / job).string());
+      spdlog::warn("job {}: frames {} are locked{}", id->short_hex(), format_frames(frames), why);
+      BATON_TRY(history.locked(versions.back(), frames, true, in_folder.changed_ms, why));
+      taken_up[*id] = std::move(frames);
+    } else {
+      BATON_ASSIGN(const std::set<std::string> files,
+                   files_of_versions(journal, versions, known.frames));
+      if (const Status dropped = retain_locks(spec.output.directory, job, files); !dropped)
+        spdlog::warn("locks stay for other coordinators: {}", dropped.error().message);
+    }
   }
-  return {};
+  return taken_up;
 }
 
 Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,

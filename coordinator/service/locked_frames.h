@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -9,7 +10,7 @@
 #include "common/job/job_spec.h"
 #include "common/job/text/roots.h"
 #include "coordinator/schedule/scheduler.h"
-#include "coordinator/service/identity_book.h"
+#include "coordinator/service/history.h"
 
 namespace baton {
 
@@ -46,14 +47,21 @@ std::set<std::string> frame_files(const JobSpec& spec, const std::vector<FrameNu
 /// to which its name led before and are no more. Errors, io: that cannot be written; and the
 /// journal's.
 Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Digest>& versions,
-                  const JobId& id, const std::vector<FrameNumber>& locked, const Roots& roots);
+                  const JobId& id, const JobLocks& locks, const Roots& roots);
 /// The same of what is locked now; where it cannot be written, that is logged, and others do not
 /// learn of it before it is said again. Errors: the journal's.
 Status tell_locks_again(Journal& journal, const JobSpec& spec, const IdentityBook& jobs,
                         const JobId& id, const Roots& roots);
-/// Takes what jobs that are known have unlocked off the job's output folder: it may have been away
-/// then, or have had another name when they were locked. Errors: the journal's.
-Status drop_stale_locks(Journal& journal, const JobSpec& spec, const IdentityBook& jobs);
+/// When the locks of a job change that do so now.
+std::int64_t lock_time_ms(const IdentityBook& jobs, const JobId& id);
+/// Makes one of what the job's output folder and the journal say of the locks of jobs that are
+/// known. The folder may have been away when frames were unlocked, or have had another name when
+/// they were locked: those are taken off it. What is newer in the folder than in the journal, which
+/// was then put back from a copy, stays locked; returned are the frames of which the journal did
+/// not know. Errors: the journal's.
+Result<std::map<JobId, std::vector<FrameNumber>>> settle_locks(Journal& journal, History& history,
+                                                               const JobSpec& spec,
+                                                               const Roots& roots);
 /// Why a job is refused that would replace frames that are locked in another one. other_name:
 /// short, of that job. there: how they are numbered in it, where names of files meet.
 Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,

@@ -17,6 +17,7 @@
 #include "coordinator/service/answers.h"
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
+#include "coordinator/service/lock_keeper.h"
 #include "coordinator/service/plan_text.h"
 #include "coordinator/service/service.h"
 #include "coordinator/service/submission.h"
@@ -62,8 +63,8 @@ Status Service::restore_jobs() {
                  farm_.journal.document(farm_.history.jobs().versions(id).back()));
     const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
     if (!document) continue;
-    BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
-                               farm_.options.roots));
+    BATON_TRY(LockKeeper(farm_).settle(document->job));
+    BATON_TRY(LockKeeper(farm_).tell_again(document->job, id));
   }
   BATON_TRY(farm_.archive_ended());
   BATON_TRY(farm_.count_kept());
@@ -109,6 +110,7 @@ Status Service::restore_job(const Digest& digest) {
     has_unread_jobs_ = true;
     return {};
   }
+  if (is_open(known.status)) BATON_TRY(LockKeeper(farm_).settle(document->job));
   JobAdded event{digest, std::move(document->job), known.status, std::move(known.completions),
                  std::move(known.failures)};
   event.spec.leading_runs = known.plan.leading_runs;
@@ -151,6 +153,7 @@ Status Service::restore_job(const Digest& digest) {
   }
   const JobStatus status = event.status;
   BATON_TRY(farm_.step(std::move(event)));
+  if (is_open(status)) BATON_TRY(LockKeeper(farm_).leave_frames(digest));
   if (lacks_mark) BATON_TRY(farm_.mark_output_again(digest));
   // What is locked stands in the mark; whoever was killed may not have come to that.
   if (const Result<std::string> marked = farm_.mark_output(digest); !marked) return marked.error();
@@ -209,10 +212,9 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   if (const Status folder = expect_folder(document->job.output.directory); !folder)
     return farm_.refuse(peer, folder.error());
   BATON_ASSIGN(const JobId id, submission.known_job(*document));
-  BATON_TRY(drop_stale_locks(farm_.journal, document->job, farm_.history.jobs()));
+  BATON_TRY(LockKeeper(farm_).settle(document->job));
   if (!farm_.history.jobs().locked(id).empty()) {
-    BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
-                               farm_.options.roots));
+    BATON_TRY(LockKeeper(farm_).tell_again(document->job, id));
   }
   const Status free = expect_no_strange_locks(document->job, farm_.history.jobs(), id);
   if (!free) return farm_.refuse(peer, free.error());
@@ -276,6 +278,7 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
   std::string plan;
   const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
   if (known != nullptr && known->status == JobStatus::paused) {
+    BATON_TRY(LockKeeper(farm_).settle(known->spec));
     BATON_ASSIGN(const std::optional<OddFrames> odd,
                  await_frames(peer, message, {*job, farm_.history.jobs().of(*job).id}, known->spec,
                               farm_.locked(*job, known->spec)));
@@ -307,8 +310,11 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   std::vector<FrameNumber> frames = message.frames;
   std::ranges::sort(frames);
   frames.erase(std::ranges::unique(frames).begin(), frames.end());
+  LockKeeper locks(farm_);
+  BATON_TRY(locks.settle(document->job));
   const JobId id = farm_.history.jobs().of(*job).id;
   const std::vector<FrameNumber> before = farm_.history.jobs().locked(id);
+  const std::int64_t changed_ms = lock_time_ms(farm_.history.jobs(), id);
   const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
   const bool is_open_now = known != nullptr && is_open(known->status);
   // Renamed for good or away for a moment: what is in it is unlocked, and nothing is made in its
@@ -324,8 +330,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
     const Status may = expect_locked(id, before, frames);
     if (!may) {
       // The folder may have been away when they were unlocked.
-      BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
-                                 farm_.options.roots));
+      BATON_TRY(locks.tell_again(document->job, id));
       return farm_.refuse(peer, may.error());
     }
     std::ranges::set_difference(before, frames, std::back_inserter(after));
@@ -346,12 +351,11 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   }
   // A lock that others cannot see is none: they would replace the frame.
   if (!message.off) {
-    const Status told = tell_locks(farm_.journal, document->job, farm_.history.jobs().versions(id),
-                                   id, after, farm_.options.roots);
+    const Status told = locks.tell(document->job, id, {{after.begin(), after.end()}, changed_ms});
     if (!told)
       return farm_.refuse(peer, {told.error().kind, "nothing is locked: " + told.error().message});
   }
-  BATON_TRY(farm_.history.locked(*job, frames, !message.off));
+  BATON_TRY(farm_.history.locked(*job, frames, !message.off, changed_ms));
   const std::set<std::string> files = frame_files(document->job, frames);
   BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return files.contains(file); }));
   spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
@@ -359,8 +363,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
   if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
   if (message.off) {
-    BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
-                               farm_.options.roots));
+    BATON_TRY(locks.tell_again(document->job, id));
   }
   // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
   // stand now.
@@ -417,9 +420,8 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
   const std::vector<FrameNumber> locked = farm_.history.jobs().locked(id);
   if (document && !locked.empty()) {
-    BATON_TRY(farm_.history.locked(*job, locked, false));
-    BATON_TRY(tell_locks_again(farm_.journal, document->job, farm_.history.jobs(), id,
-                               farm_.options.roots));
+    BATON_TRY(farm_.history.locked(*job, locked, false, lock_time_ms(farm_.history.jobs(), id)));
+    BATON_TRY(LockKeeper(farm_).tell_again(document->job, id));
   }
   for (const Digest& version : farm_.history.jobs().versions(id)) {
     BATON_TRY(farm_.archive_job(version));

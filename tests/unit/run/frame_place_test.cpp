@@ -67,9 +67,9 @@ TEST_F(FramePlaceTest, WhatCannotBeReadIsAnError) {
 TEST_F(FramePlaceTest, WhatOthersHaveLockedStays) {
   const Digest there = put_picture(0.5f, "0123");
   const std::string name = frame.filename().string();
-  ASSERT_TRUE(record_locks(folder, kJob.hex(), {name}));
+  ASSERT_TRUE(record_locks(folder, kJob.hex(), {{name}}));
   EXPECT_FALSE(find({there})) << "its own lock";
-  ASSERT_TRUE(record_locks(folder, JobId{8}.hex(), {"another.exr", name}));
+  ASSERT_TRUE(record_locks(folder, JobId{8}.hex(), {{"another.exr", name}}));
   EXPECT_TRUE(find({there}));
   ASSERT_TRUE(record_locks(folder, JobId{8}.hex(), {}));
   EXPECT_FALSE(find({there}));
@@ -90,7 +90,7 @@ TEST_F(FramePlaceTest, LocksOfTwoAreKeptWhoeverWritesMeanwhile) {
     writers.emplace_back([&, id] {
       for (int i = 0; i < 200; ++i) {
         EXPECT_TRUE(record_locks(folder, id, {}));
-        EXPECT_TRUE(record_locks(folder, id, {id + ".exr"}));
+        EXPECT_TRUE(record_locks(folder, id, {{id + ".exr"}}));
         EXPECT_TRUE(locks_of_others(folder, "").value().contains(id + ".exr"));
       }
     });
@@ -99,8 +99,21 @@ TEST_F(FramePlaceTest, LocksOfTwoAreKeptWhoeverWritesMeanwhile) {
   EXPECT_EQ(locks_of_others(folder, "").value().size(), 2u);
 }
 
+// Older programs wrote no time, others end lines with a carriage return.
+TEST_F(FramePlaceTest, LocksAreReadAsOthersWriteThem) {
+  const FolderLocks locks{{"frame.0001.exr", "frame.0002.exr"}, 1234567890123};
+  ASSERT_TRUE(record_locks(folder, "a", locks));
+  const fs::path file = lock_folder(folder) / "b";
+  ASSERT_TRUE(write_file_atomic(file, as_bytes_view("frame.0003.exr\r\n\r\n")));
+  const auto read = locks_by_job(folder).value();
+  EXPECT_EQ(read.at("a"), locks);
+  EXPECT_EQ(read.at("b"), FolderLocks({"frame.0003.exr"}, 0));
+  ASSERT_TRUE(retain_locks(folder, "a", {"frame.0002.exr"}));
+  EXPECT_EQ(locks_by_job(folder).value().at("a"), FolderLocks({"frame.0002.exr"}, 1234567890123));
+}
+
 TEST_F(FramePlaceTest, NothingIsLockedInAFolderThatIsNotThere) {
-  EXPECT_FALSE(record_locks(folder / "unmounted", kJob.hex(), {"frame.exr"}));
+  EXPECT_FALSE(record_locks(folder / "unmounted", kJob.hex(), {{"frame.exr"}}));
   EXPECT_TRUE(record_locks(folder / "unmounted", kJob.hex(), {}));
   EXPECT_FALSE(fs::exists(folder / "unmounted"));
 }

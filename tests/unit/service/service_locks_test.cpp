@@ -151,6 +151,67 @@ TEST_F(FramesTest, TheMarkSaysWhichFramesAreLocked) {
   EXPECT_FALSE(fs::exists(mark(id))) << "all is done";
 }
 
+// The work folder is put back from a copy that is older than a lock: the output folder knows
+// better.
+TEST_F(FramesTest, ALockThatIsNewerThanTheJournalStays) {
+  const fs::path journal = options.work_dir / "journal.sqlite", copy = folder / "copy.sqlite";
+  const auto put_back = [&] {
+    for (const char* const rest : {"-wal", "-shm"}) fs::remove(journal.string() + rest);
+    fs::copy_file(copy, journal, fs::copy_options::overwrite_existing);
+  };
+  Digest id;
+  {
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    id = begin(service.endpoint(), worker);
+  }
+  fs::copy_file(journal, copy);
+  // Of an open job.
+  put(4, std::string(kPicture));
+  {
+    const RunningService service(options);
+    ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(4)}});
+  }
+  put_back();
+  {
+    const RunningService service(options);
+    EXPECT_THAT(locked_frames(service.endpoint(), id), ElementsAre(FrameNumber(4)));
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  }
+  EXPECT_EQ(read_text_file(frame(4), 100).value(), kPicture);
+
+  // Of one that is done: what is unlocked here stays locked there, and the other way round.
+  fs::copy_file(journal, copy, fs::copy_options::overwrite_existing);
+  put(2, std::string(kPicture));
+  {
+    const RunningService service(options);
+    ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}});
+    ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(4)}, /*off=*/true});
+  }
+  put_back();
+  JobSpec other = job;
+  other.name = "other";
+  const RunningService service(options);
+  const std::string refusal =
+      refused(service.endpoint(), SubmitJob{make_job_document(other).value(), true}).message;
+  EXPECT_THAT(refusal, HasSubstr("frames 2,4 in"));
+  const JobAccepted accepted =
+      ask<JobAccepted>(service.endpoint(), SubmitJob{document, /*restart=*/true});
+  EXPECT_THAT(accepted.plan, HasSubstr("frames 2,4 are locked"));
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  EXPECT_EQ(read_text_file(frame(2), 100).value(), kPicture);
+
+  // Once it is known it is unlocked like any other.
+  ask<ShownJob>(service.endpoint(),
+                LockFrames{id.hex(), {FrameNumber(2), FrameNumber(4)}, /*off=*/true});
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document, /*restart=*/true});
+  EXPECT_THAT(locked_frames(service.endpoint(), id), SizeIs(0));
+}
+
 // The frames that two jobs share are locked: none of them says whose picture the open one is.
 TEST_F(FramesTest, AnOpenJobIsNotEndedForLockedFramesAlone) {
   const RunningService service(options);
