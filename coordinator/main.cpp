@@ -9,6 +9,7 @@
 #include "common/base/build.h"
 #include "common/base/exit_codes.h"
 #include "common/base/files.h"
+#include "common/base/limits.h"
 #include "common/base/log.h"
 #include "common/base/option_values.h"
 #include "common/image/exr_check.h"
@@ -28,10 +29,37 @@ void install_stop_handler() {
   ::sigaction(SIGINT, &action, nullptr);
 }
 
+/// Who is let in, and what may then be done.
+void add_rights(CLI::App& app, baton::ServiceOptions& options, std::string& key_file,
+                bool& insecure) {
+  app.add_option(
+         "--key", key_file,
+         "server.key of `baton key create`; whoever it knows is let in. Without it, an address "
+         "of this machine has keys of its own, which programs of this user find")
+      ->envname("BATON_KEY");
+  app.add_flag("--insecure", insecure,
+               "listen without a key: whoever reaches the address may do everything");
+  app.add_option("--root", options.roots,
+                 "folder that jobs may read from and write to, may be repeated; needed where other "
+                 "machines reach the coordinator; default elsewhere: all");
+  app.add_option("--user-priority", options.user_priority,
+                 "the highest priority that a user's key may give")
+      ->check(CLI::Range(0, baton::limits::kMaxPriority))
+      ->capture_default_str();
+}
+
 baton::Status coordinate(baton::ServiceOptions options, const std::string& key_file, bool insecure,
                          const std::filesystem::path& endpoint_file) {
-  BATON_ASSIGN(options.access, baton::server_access(key_file, insecure));
+  if (!baton::is_of_this_machine(options.listen) && options.roots.empty()) {
+    return baton::Error{baton::ErrorKind::usage,
+                        options.listen +
+                            ": other machines reach it: --root FOLDER says where jobs may read and "
+                            "write, and may be repeated; --root / allows all folders"};
+  }
+  BATON_ASSIGN(options.access,
+               baton::server_access(key_file, insecure, options.listen, options.work_dir));
   BATON_ASSIGN(baton::Service service, baton::Service::open(options));
+  const baton::OwnKeysNote note(service.endpoint(), options.access);
   if (!endpoint_file.empty()) {
     BATON_TRY(
         baton::write_file_atomic(endpoint_file, baton::as_bytes_view(service.endpoint() + "\n")));
@@ -80,11 +108,7 @@ int main(int argc, char** argv) {
       "is by one of them, which goes on while it is there");
   std::string key_file;
   bool insecure = false;
-  app.add_option("--key", key_file, "server.key of `baton key create`; whoever it knows is let in")
-      ->envname("BATON_KEY");
-  app.add_flag("--insecure", insecure, "listen to other machines without a key");
-  app.add_option("--root", options.roots,
-                 "folder that jobs may read from and write to, may be repeated; default: all");
+  add_rights(app, options, key_file, insecure);
   std::uint64_t store_limit_mib = 0;
   app.add_option("--store-limit", store_limit_mib,
                  "MiB that states and films may take in the work folder: jobs that would need more "

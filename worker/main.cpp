@@ -120,7 +120,8 @@ int work(baton::WorkerOptions& worker, const PilotOptions& pilot, const std::str
     spdlog::error("{}", taken.error().message);
     return static_cast<int>(baton::exit_code_of(taken.error().kind));
   }
-  baton::Result<baton::ClientAccess> access = baton::client_access(key_file, insecure);
+  baton::Result<baton::ClientAccess> access =
+      baton::client_access(key_file, insecure, worker.endpoint);
   if (!access) {
     spdlog::error("{}", access.error().message);
     return static_cast<int>(baton::exit_code_of(access.error().kind));
@@ -169,7 +170,7 @@ int main(int argc, char** argv) {
   std::string key_file;
   bool insecure = false;
   app.add_option("--key", key_file, "worker.key of `baton key create`")->envname("BATON_KEY");
-  app.add_flag("--insecure", insecure, "connect to another machine without a key");
+  app.add_flag("--insecure", insecure, "connect without a key");
   app.add_option("--root", worker.machine.roots,
                  "folder that jobs may read from and write to, may be repeated; default: all");
 

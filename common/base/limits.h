@@ -14,6 +14,16 @@ inline constexpr std::uint64_t kMaxMessageBytes = 64ull << 20;
 inline constexpr std::uint64_t kMaxWorkerMessageBytes = 8ull << 20;  // what a worker says
 /// Bytes from one connection without the end of a message.
 inline constexpr std::uint64_t kMaxUnendedBytes = 2 * kMaxMessageBytes;
+/// What may wait for one connection to be read, beside one message, and for all together. Of
+/// messages of more than kSmallMessageBytes, which the number of those that wait limits.
+inline constexpr std::uint64_t kMaxUnreadBytes = kMaxMessageBytes;
+inline constexpr std::uint64_t kMaxUnreadBytesInAll = 8 * kMaxMessageBytes;
+inline constexpr std::uint64_t kSmallMessageBytes = 16 << 10;
+/// Of one address, that have said nothing for kSilenceAllowed since they were made.
+inline constexpr int kMaxSilentConnections = 64;
+/// Of the programs that `baton render` and `farm slurm` start; then it is begun anew.
+inline constexpr std::uintmax_t kMaxLogBytes = 16ull << 20;
+inline constexpr std::chrono::seconds kSilenceAllowed{2};
 inline constexpr int kMaxMessageFrames = 4;      // with the peer's identity
 inline constexpr int kMaxQueuedMessages = 4096;  // per connection, either way
 inline constexpr int kMaxSections = 64;          // sections of one state or film file
@@ -98,6 +108,8 @@ inline constexpr int kMaxSecondsPerTask = 30 * 24 * 3600;
 inline constexpr int kMaxSecondsToLoad = 900;
 inline constexpr int kMaxLeasesPerWorker = 1024;
 inline constexpr int kMaxPriority = 100;  ///< of a job
+/// That users may give, unless the farm says otherwise.
+inline constexpr int kMaxUserPriority = 75;
 inline constexpr int kMaxJobs = 10000;
 inline constexpr int kMaxWorkers = 4096;
 inline constexpr std::size_t kMaxCachedJobs = 4;            ///< loaded scenes a worker keeps

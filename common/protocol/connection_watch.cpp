@@ -1,10 +1,14 @@
 #include "common/protocol/connection_watch.h"
 
+#include <arpa/inet.h>
+#include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <netinet/in.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "common/base/check.h"
@@ -21,6 +25,27 @@ std::optional<std::uint64_t> bytes_received(int descriptor) {
   socklen_t size = sizeof(info);
   if (::getsockopt(descriptor, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return std::nullopt;
   return info.tcpi_bytes_received;
+}
+
+/// What the other end has not taken of what was written; 0: all, or there is no such connection.
+int unsent_bytes(int descriptor) {
+  int count = 0;
+  return ::ioctl(descriptor, SIOCOUTQ, &count) == 0 ? count : 0;
+}
+
+/// Of the other end of a TCP connection, without its port; empty: it is none.
+std::string address_of(int descriptor) {
+  sockaddr_storage address{};
+  socklen_t size = sizeof(address);
+  if (::getpeername(descriptor, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  const void* const number =
+      address.ss_family == AF_INET
+          ? static_cast<const void*>(&reinterpret_cast<const sockaddr_in*>(&address)->sin_addr)
+          : &reinterpret_cast<const sockaddr_in6*>(&address)->sin6_addr;
+  if (address.ss_family != AF_INET && address.ss_family != AF_INET6) return {};
+  return ::inet_ntop(address.ss_family, number, text.data(), text.size()) == nullptr ? ""
+                                                                                     : text.data();
 }
 
 }  // namespace
@@ -59,7 +84,9 @@ bool ConnectionWatch::poll() {
     std::memcpy(&number, event[0].data(), sizeof(number));
     std::memcpy(&value, event[0].data() + sizeof(number), sizeof(value));
     if (number == ZMQ_EVENT_ACCEPTED) {
-      connections_[static_cast<int>(value)] = {};
+      const int descriptor = static_cast<int>(value);
+      if (const auto old = connections_.find(descriptor); old != connections_.end()) forget(old);
+      connections_[descriptor] = {std::chrono::steady_clock::now(), address_of(descriptor)};
       continue;
     }
     if (number == ZMQ_EVENT_CONNECTED) {
@@ -75,26 +102,58 @@ bool ConnectionWatch::poll() {
   }
 }
 
-void ConnectionWatch::note_message(const zmq::message_t& frame) {
+void ConnectionWatch::note_message(const zmq::message_t& frame, const Bytes& peer) {
   const auto found = connections_.find(::zmq_msg_get(frame.handle(), ZMQ_SRCFD));
-  if (found != connections_.end()) found->second.has_spoken = true;
+  if (found == connections_.end()) return;
+  Connection& connection = found->second;
+  connection.has_spoken = true;
+  if (!std::exchange(connection.is_known, true)) {
+    connection.peer = peer;
+    peers_[peer] = found->first;
+  }
 }
 
-void ConnectionWatch::close_endless() {
+bool ConnectionWatch::take_place(const Bytes& peer, std::uint64_t size_bytes) {
+  const auto known = peers_.find(peer);
+  if (size_bytes <= limits::kSmallMessageBytes || known == peers_.end()) return true;
+  std::uint64_t in_all = size_bytes;
+  for (auto& [descriptor, connection] : connections_) {
+    // The library writes as long as the system takes it: where nothing waits there, nothing waits.
+    if (connection.unread > 0 && unsent_bytes(descriptor) == 0) connection.unread = 0;
+    in_all += connection.unread;
+  }
+  Connection& connection = connections_.at(known->second);
+  const bool has_room = connection.unread + size_bytes <= limits::kMaxUnreadBytes &&
+                        in_all <= limits::kMaxUnreadBytesInAll;
+  if (connection.unread > 0 && !has_room) return false;
+  connection.unread += size_bytes;
+  return true;
+}
+
+ConnectionWatch::Connections::iterator ConnectionWatch::forget(Connections::iterator connection) {
+  peers_.erase(connection->second.peer);
+  return connections_.erase(connection);
+}
+
+void ConnectionWatch::close_unwelcome() {
+  const auto silent_since = std::chrono::steady_clock::now() - limits::kSilenceAllowed;
+  std::map<std::string, int> silent;
   for (auto next = connections_.begin(); next != connections_.end();) {
-    const auto [descriptor, connection] = *next;
+    const auto& [descriptor, connection] = *next;
     const std::optional<std::uint64_t> bytes = bytes_received(descriptor);
     const bool is_endless =
         bytes && !connection.has_spoken && *bytes > connection.bytes + limits::kMaxUnendedBytes;
-    if (is_endless) {
+    const bool is_silent = bytes && !connection.is_known && connection.made < silent_since;
+    const bool is_crowd = is_silent && ++silent[connection.address] > limits::kMaxSilentConnections;
+    if (is_endless || is_crowd) {
       ::shutdown(descriptor, SHUT_RDWR);
-      note(Failure::endless);
+      note(is_endless ? Failure::endless : Failure::crowd);
     }
-    if (!bytes || is_endless) {
-      next = connections_.erase(next);
+    if (!bytes || is_endless || is_crowd) {
+      next = forget(next);
       continue;
     }
-    if (connection.has_spoken) next->second = {*bytes, false};
+    if (std::exchange(next->second.has_spoken, false)) next->second.bytes = *bytes;
     ++next;
   }
 }

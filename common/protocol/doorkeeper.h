@@ -20,6 +20,8 @@ class Doorkeeper {
   /// To be polled: there are questions.
   zmq::socket_t& questions() { return questions_; }
   void answer();
+  /// Others are let in from now on.
+  void let_in(std::map<std::string, Speaker> known) { known_ = std::move(known); }
   /// Who was refused last, since the last call.
   std::optional<std::string> take_refusal() { return std::exchange(refusal_, std::nullopt); }
 

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zmq.h>
@@ -24,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMaxKeyFileBytes = 1 << 20;
 constexpr std::size_t kKeyLength = 40;
-constexpr std::array<Role, 3> kRoles{Role::worker, Role::user, Role::admin};
+constexpr std::array<Role, 4> kRoles{Role::worker, Role::viewer, Role::user, Role::admin};
 constexpr const char* kHeader =
     "# A key of Baton (docs/farm.md). Whoever can read it is taken for its owner.\n";
 
@@ -111,22 +110,10 @@ Result<std::string> write_client_key(const fs::path& folder, const Speaker& spea
   return fmt::format("knows {} {} {}\n", role_name(speaker.role), speaker.name, pair.public_key);
 }
 
-/// Whether only programs of this machine reach it.
-bool is_of_this_machine(const std::string& endpoint) {
-  if (endpoint.starts_with("ipc://") || endpoint.starts_with("inproc://")) return true;
-  constexpr std::string_view kTcp = "tcp://";
-  if (!endpoint.starts_with(kTcp)) return false;
-  const std::string host = endpoint.substr(
-      kTcp.size(), endpoint.rfind(':') - std::min(endpoint.rfind(':'), kTcp.size()));
-  const bool is_127 =
-      host.starts_with("127.") && host.find_first_not_of("0123456789.") == std::string::npos;
-  return is_127 || host == "localhost" || host == "[::1]" || host == "lo";
-}
-
 }  // namespace
 
 std::string_view role_name(Role role) {
-  constexpr std::array<std::string_view, 3> kNames{"worker", "user", "admin"};
+  constexpr std::array<std::string_view, 4> kNames{"worker", "viewer", "user", "admin"};
   return kNames.at(static_cast<std::size_t>(role));
 }
 
@@ -141,8 +128,8 @@ Result<ClientKey> read_client_key(const fs::path& path) {
     const std::string value = line.words.size() == 2 ? line.words[1] : "";
     if (what == "knows")
       return Error{ErrorKind::usage,
-                   fmt::format("{}: is the key of a coordinator, expected that of a worker, a user "
-                               "or an admin",
+                   fmt::format("{}: is the key of a coordinator, expected that of a worker, a "
+                               "viewer, a user or an admin",
                                path.string())};
     const bool good = what == "role"   ? role_of(value).has_value()
                       : what == "name" ? is_name(value)
@@ -168,8 +155,8 @@ Result<ServerKey> read_server_key(const fs::path& path) {
     const std::size_t count = line.words.size();
     if (what == "role")
       return Error{ErrorKind::usage,
-                   fmt::format("{}: is the key of a worker, a user or an admin, expected that of a "
-                               "coordinator",
+                   fmt::format("{}: is the key of a worker, a viewer, a user or an admin, expected "
+                               "that of a coordinator",
                                path.string())};
     if (what == "public" && count == 2 && is_key(line.words[1])) {
       key.own.public_key = line.words[1];
@@ -190,9 +177,10 @@ Result<ServerKey> read_server_key(const fs::path& path) {
 Status create_keys(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  const std::array<Speaker, 3> speakers{Speaker{Role::worker, "worker"},
+  const std::array<Speaker, 4> speakers{Speaker{Role::worker, "worker"},
+                                        Speaker{Role::viewer, "viewer"},
                                         Speaker{Role::user, "user"}, Speaker{Role::admin, "admin"}};
-  for (const char* name : {"server", "worker", "user", "admin"}) {
+  for (const char* name : {"server", "worker", "viewer", "user", "admin"}) {
     if (const fs::path path = folder / (std::string(name) + ".key"); fs::exists(path, error))
       return Error{ErrorKind::usage,
                    fmt::format("{}: is there already; a key is not replaced", path.string())};
@@ -216,35 +204,6 @@ Status add_key(const fs::path& folder, const Speaker& speaker) {
   BATON_ASSIGN(const ServerKey server, read_server_key(folder / "server.key"));
   BATON_ASSIGN(const std::string line, write_client_key(folder, speaker, server.own.public_key));
   return write_secret(folder / "server.key", line, O_APPEND);
-}
-
-// ---- access -------------------------------------------------------------------------------------
-
-Result<ClientAccess> client_access(const std::string& key_file, bool insecure) {
-  if (key_file.empty()) return ClientAccess{std::nullopt, insecure};
-  BATON_ASSIGN(ClientKey key, read_client_key(key_file));
-  return ClientAccess{std::move(key), insecure};
-}
-
-Result<ServerAccess> server_access(const std::string& key_file, bool insecure) {
-  if (key_file.empty()) return ServerAccess{std::nullopt, insecure};
-  BATON_ASSIGN(ServerKey key, read_server_key(key_file));
-  return ServerAccess{std::move(key), insecure};
-}
-
-Status check_exposure(const std::string& endpoint, bool has_key, bool insecure) {
-  if (has_key || is_of_this_machine(endpoint)) return {};
-  if (insecure) {
-    spdlog::warn(
-        "INSECURE: {} has no key: whoever reaches it can stop the farm, read names and write "
-        "files",
-        endpoint);
-    return {};
-  }
-  return Error{ErrorKind::usage,
-               fmt::format("{}: other machines reach it, so it needs a key: --key or BATON_KEY "
-                           "(`baton key create FOLDER` makes keys; --insecure goes without)",
-                           endpoint)};
 }
 
 }  // namespace baton

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "common/base/file_stamp.h"
 #include "common/protocol/messages.h"
 #include "common/protocol/socket.h"
 
@@ -30,6 +31,10 @@ class Router {
   bool send(const PeerId& peer, const Message& message);
   /// The next message of any peer, or nullopt after `timeout`, a signal or wake().
   std::optional<Incoming> receive(std::chrono::milliseconds timeout);
+  /// Looks whether the file of the keys has changed: whoever it knows now is let in, of others
+  /// nothing is taken any more. Returns what is to be said of that. Errors: it cannot be read, or
+  /// has another key for the coordinator itself; then all stays as it was.
+  Result<std::optional<std::string>> read_keys_again();
   /// What became of a connection that was refused, since the last call.
   std::optional<Error> take_refusal() { return socket_.take_refusal(); }
   /// Ends a receive() early, from any thread.
@@ -38,11 +43,12 @@ class Router {
   const std::string& endpoint() const { return socket_.endpoint(); }
 
  private:
-  Router(Socket socket, std::optional<ServerKey> key)
-      : socket_(std::move(socket)), key_(std::move(key)) {}
+  Router(Socket socket, ServerAccess access)
+      : socket_(std::move(socket)), access_(std::move(access)) {}
 
   Socket socket_;
-  std::optional<ServerKey> key_;
+  ServerAccess access_;
+  std::optional<FileStamp> key_stamp_;  ///< of access_.key_file, as it was last read
 };
 
 }  // namespace baton

@@ -28,6 +28,7 @@ constexpr int kHandshakeMs = 10000;
 constexpr int kKeepAliveIdleS = 5, kKeepAliveIntervalS = 2, kKeepAliveProbes = 3;
 constexpr int kUnansweredMs = 12000;
 constexpr std::chrono::milliseconds kClosingInterval{100};
+constexpr int kMostFailures = 4;
 
 void set_options(zmq::socket_t& socket, std::chrono::milliseconds linger) {
   socket.set(zmq::sockopt::linger, static_cast<int>(linger.count()));
@@ -91,6 +92,20 @@ struct Socket::Impl {
     socket.set(zmq::sockopt::curve_server, 1);
     socket.set(zmq::sockopt::curve_secretkey, key.own.secret_key);
   }
+  /// A coordinator that was started later or again may have made keys since. False: not others.
+  bool take_new_key() {
+    const Result<std::optional<ClientKey>> found = own_key(endpoint);
+    if (!finds_key || !found || *found == found_key) return false;
+    socket.disconnect(endpoint);
+    found_key = *found;
+    if (found_key) {
+      use(*found_key);
+    } else {
+      ::zmq_setsockopt(socket.handle(), ZMQ_PLAIN_USERNAME, nullptr, 0);  // none is used
+    }
+    socket.connect(endpoint);
+    return true;
+  }
   /// Polled beside the socket itself, which is the first.
   std::vector<zmq::pollitem_t> poll_items(short events) {
     std::vector<zmq::pollitem_t> items{{socket.handle(), 0, events, 0}};
@@ -98,14 +113,22 @@ struct Socket::Impl {
     if (doorkeeper) items.push_back({doorkeeper->questions().handle(), 0, ZMQ_POLLIN, 0});
     return items;
   }
-  bool is_denied() const { return watch.failure() == ConnectionWatch::Failure::denied; }
+  /// That it will not be let in: it was told so, or was broken off again and again.
+  bool is_denied() const {
+    return watch.failure() == ConnectionWatch::Failure::denied || num_failed >= kMostFailures;
+  }
   /// True: a handshake has failed.
   bool look_at_connections() {
     if (doorkeeper) doorkeeper->answer();
-    const bool has_failed = watch.poll();
+    bool has_failed = watch.poll();
+    if (has_failed && take_new_key()) {
+      watch.take();
+      has_failed = false;
+    }
+    if (has_failed) ++num_failed;
     const auto now = Clock::now();
     if (is_server && now >= next_closing) {
-      watch.close_endless();
+      watch.close_unwelcome();
       next_closing = now + kClosingInterval;
     }
     return has_failed;
@@ -132,10 +155,16 @@ struct Socket::Impl {
   std::optional<Doorkeeper> doorkeeper;
   FileDescriptor wake_fd;
   std::string endpoint, sender_key;
+  std::optional<ClientKey> found_key;  ///< in use, where finds_key
+  bool finds_key = false;              ///< ClientAccess::finds_key
   bool is_server;
+  int num_failed = 0;  ///< handshakes
   Clock::time_point next_closing;
 };
 
+void Socket::let_in(const std::map<std::string, Speaker>& known) {
+  if (impl_->doorkeeper) impl_->doorkeeper->let_in(known);
+}
 void Socket::hang_up() { impl_->socket.disconnect(impl_->endpoint); }
 void Socket::dial() { impl_->socket.connect(impl_->endpoint); }
 
@@ -161,6 +190,10 @@ Result<Socket> Socket::open(const std::string& endpoint, std::chrono::millisecon
     set_options(impl->socket, linger);
     if (listen && server->key) impl->use(*server->key);
     if (!listen && client->key) impl->use(*client->key);
+    if (!listen && client->finds_key) {
+      impl->finds_key = true;
+      impl->found_key = client->key;
+    }
     impl->socket.set(zmq::sockopt::immediate, unconnected == Unconnected::refuse);
     if (listen) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
@@ -201,6 +234,11 @@ bool Socket::wait_to_send(std::chrono::milliseconds timeout) {
 }
 
 bool Socket::send(const std::vector<Bytes>& frames) {
+  if (impl_->is_server) {
+    std::uint64_t size = 0;
+    for (const Bytes& frame : frames) size += frame.size();
+    if (!impl_->watch.take_place(frames.front(), size)) return false;
+  }
   try {
     bool queued = true;
     for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -231,7 +269,7 @@ std::optional<std::vector<Bytes>> Socket::receive(std::chrono::milliseconds time
         [&] { return impl_->socket.recv(frame, zmq::recv_flags::dontwait).has_value(); });
     if (!received) return std::nullopt;
     // Who sent it stands with each frame but the first, which the library adds.
-    if (frames.size() == 1 && impl_->is_server) impl_->watch.note_message(frame);
+    if (frames.size() == 1 && impl_->is_server) impl_->watch.note_message(frame, frames.front());
     if (frames.size() <= 1 && impl_->doorkeeper) {
       const char* const key = ::zmq_msg_gets(frame.handle(), "User-Id");
       impl_->sender_key = key != nullptr ? key : "";
@@ -260,6 +298,10 @@ std::optional<Error> Socket::take_refusal() {
       return Error{ErrorKind::usage,
                    fmt::format("a connection: {} bytes without the end of a message",
                                limits::kMaxUnendedBytes)};
+    if (*failure == ConnectionWatch::Failure::crowd)
+      return Error{ErrorKind::usage,
+                   fmt::format("connections: more than {} of one address that say nothing",
+                               limits::kMaxSilentConnections)};
     if (*failure == ConnectionWatch::Failure::replayed)
       return Error{ErrorKind::usage, "a connection: a message came a second time, or out of turn"};
     return Error{ErrorKind::usage, "a connection: it has no key, or not one for this coordinator"};

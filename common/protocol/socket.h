@@ -8,7 +8,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/result.h"
-#include "common/protocol/keys.h"
+#include "common/protocol/access.h"
 
 namespace baton {
 
@@ -42,13 +42,16 @@ class Socket {
   /// key was refused.
   bool wait_to_send(std::chrono::milliseconds timeout);
   /// Queues the frames; false when the queue is full or the peer is gone, and then nothing was
-  /// queued.
+  /// queued. Where many connect, the queue of a peer is full, too, when it reads nothing and too
+  /// many bytes wait for it (ConnectionWatch::take_place).
   bool send(const std::vector<Bytes>& frames);
   /// The next message, or nullopt after `timeout`, a signal, wake() or a refusal. Of a message with
   /// more than limits::kMaxMessageFrames frames only so many are returned.
   std::optional<std::vector<Bytes>> receive(std::chrono::milliseconds timeout);
   /// The public key of who sent the last message; empty: without keys.
   const std::string& sender_key() const;
+  /// Of a socket that listens: others are let in from now on. Who is connected stays so.
+  void let_in(const std::map<std::string, Speaker>& known);
   /// Ends the connection of a socket that connects; dial() makes it again. What is queued is lost.
   void hang_up();
   void dial();

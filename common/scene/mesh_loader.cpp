@@ -18,7 +18,8 @@ Error bad_mesh(const std::string& path, const std::string& what) {
 }
 
 /// Reads the triangles with the reader that fits the file.
-Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals, bool with_uvs) {
+Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals, bool with_uvs,
+                                    const std::set<std::string>* listed) {
   const std::string extension = lower_extension(path);
   if (extension == ".off") {
     BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxAssetFileBytes));
@@ -29,7 +30,7 @@ Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals
     return parse_ply(bytes, path, smooth_normals);
   }
   if (extension == ".gltf" || extension == ".glb") {
-    BATON_ASSIGN(const auto document, gltf::read_document(path));
+    BATON_ASSIGN(const auto document, gltf::read_document(path, listed));
     return gltf::whole_mesh(*document, smooth_normals);
   }
   BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxAssetFileBytes));
@@ -38,7 +39,8 @@ Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals
 
 }  // namespace
 
-Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, bool with_uvs) {
+Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, bool with_uvs,
+                               const std::set<std::string>* listed) {
   // Look at the file before any reader does.
   BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
   if (!stamp) return bad_mesh(path, "missing: expected a mesh file");
@@ -46,7 +48,7 @@ Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, boo
     return bad_mesh(path, "larger than " + std::to_string(limits::kMaxAssetFileBytes) + " bytes");
   }
 
-  BATON_ASSIGN(TriangleMesh mesh, read_triangles(path, smooth_normals, with_uvs));
+  BATON_ASSIGN(TriangleMesh mesh, read_triangles(path, smooth_normals, with_uvs, listed));
   if (mesh.triangles.empty()) {
     return bad_mesh(path, "no triangles (" + std::to_string(mesh.dropped_triangles) +
                               " without area); points and lines are not shown");

@@ -173,7 +173,7 @@ std::set<std::string> textured_meshes(const SceneSpec& spec) {
 
 Result<TriangleMesh> load_part(const MeshSpec& spec, bool with_uvs, gltf::FileCache& files,
                                gltf::MotionCache& motions) {
-  if (spec.mesh < 0) return load_mesh(spec.path, spec.smooth_normals, with_uvs);
+  if (spec.mesh < 0) return load_mesh(spec.path, spec.smooth_normals, with_uvs, files.listed());
   BATON_ASSIGN(const auto document, files.get(spec.path));
   if (!spec.shaped_by) return gltf::primitive_mesh(*document, spec);
   BATON_ASSIGN(auto motion, motions.get(document, *spec.shaped_by));
@@ -290,12 +290,17 @@ MeshVertices vertices_of(const Scene& scene, const MeshShapes& shapes, std::uint
   return {rest.positions, rest.normals, rest.tangents};
 }
 
-Result<Scene> load_scene(const JobSpec& job) {
+Result<Scene> load_scene(const JobSpec& job, FilesBeside beside) {
   Scene scene;
   Faults faults;
 
   // Materials and meshes, in the order of their names.
-  gltf::FileCache files;
+  std::optional<std::set<std::string>> listed;
+  if (beside == FilesBeside::listed) {
+    listed.emplace();
+    for (const FileSpec& file : job.scene.files) listed->insert(file.path);
+  }
+  gltf::FileCache files(std::move(listed));
   DetailLoader details(files, job.scene.files);
   NameIndex materials;
   std::vector<const MaterialSpec*> material_specs;

@@ -57,7 +57,14 @@ struct MeshVertices {
 };
 MeshVertices vertices_of(const Scene& scene, const MeshShapes& shapes, std::uint32_t mesh);
 
+/// Which files beside those that a job names its glTF files may lead to.
+enum class FilesBeside {
+  any,
+  /// Those in SceneSpec::files, which settle_scene() has found.
+  listed,
+};
+
 /// Loads every mesh and resolves every name. The ground is a two-triangle mesh of its own.
-Result<Scene> load_scene(const JobSpec& job);
+Result<Scene> load_scene(const JobSpec& job, FilesBeside beside = FilesBeside::any);
 
 }  // namespace baton

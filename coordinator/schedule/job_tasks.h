@@ -54,6 +54,8 @@ class JobTasks {
                                  BlobReferences& blobs, const JobPlan& plan = {});
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(TaskIndex task) { return book_.grant(graph_, task); }
+  /// Leases a ready task once more by an attempt that was granted before.
+  void take_up(TaskIndex task) { book_.take_up(graph_, task); }
   /// Ends a leased task: its outputs must be complete and sorted (JobGraph::check_outputs).
   /// Releases its dependents, and the blobs that nobody needs any more. is_shared: other workers
   /// may read its state.

@@ -259,7 +259,13 @@ void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) 
   const Failure& failure = event.failure;
   if (!leases_.touch(failure.worker, now)) return;
   const Claim claim = find_claim(failure.worker, failure.lease, now, actions);
-  if (claim.job) fail_attempt(claim, failure, now, actions);
+  if (!claim.job) return;
+  // Of what an earlier coordinator granted nobody here knows whether it did.
+  if (failure.lease.epoch == rules_.epoch) {
+    fail_attempt(claim, failure, now, actions);
+  } else {
+    return_lease(claim, failure.lease, failure.message, actions);
+  }
 }
 
 void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {

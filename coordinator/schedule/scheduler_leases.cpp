@@ -98,7 +98,7 @@ double Scheduler::longest_task_seconds() const {
 
 /// The task of a lease that the worker says it has. A lease that was lost, or granted by an earlier
 /// coordinator, is taken up again while nobody else has the task or holds what it was made of. No
-/// job in the answer: the lease is over.
+/// job in the answer: the lease is over, or was never granted.
 Scheduler::Claim Scheduler::find_claim(const std::string& worker, const LeaseId& lease,
                                        TimePoint now, Actions& actions) {
   Job* job = find(lease.job);
@@ -110,11 +110,14 @@ Scheduler::Claim Scheduler::find_claim(const std::string& worker, const LeaseId&
     const Lease& current = leases_.at({lease.job, *task});
     return current.id == lease && current.worker == worker ? Claim{job, *task} : Claim{};
   }
-  if (job->tasks.book().status(*task) != TaskStatus::ready ||
+  const bool was_granted =
+      lease.epoch < rules_.epoch || (lease.epoch == rules_.epoch && lease.attempt > 0 &&
+                                     lease.attempt <= job->tasks.book().attempts(*task));
+  if (!was_granted || job->tasks.book().status(*task) != TaskStatus::ready ||
       job->tasks.attempts().has_ended(*task, lease) || !can_read(job->tasks, *task, worker) ||
       !leases_.renders_as(worker, renderer_of(lease.job, *job, leases_)))
     return {};
-  job->tasks.grant(*task);
+  job->tasks.take_up(*task);
   add_lease(worker, lease, *task, now);
   actions.push_back(TellLeaseTaken{lease, worker});
   return {job, *task};

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "coordinator/schedule/scheduler.h"
 
 namespace baton {
@@ -10,7 +12,10 @@ void Scheduler::on(const AttemptLeft& attempt, TimePoint, Actions&) {
   const auto task = job ? job->tasks.graph().find(attempt.lease.task) : std::nullopt;
   Lease* const lease = task ? leases_.find({attempt.lease.job, *task}) : nullptr;
   if (lease != nullptr) {
+    // More than that no attempt leaves.
+    constexpr std::size_t kMostLeft = 1 << 20;
     lease->left.insert(lease->left.end(), attempt.blobs.begin(), attempt.blobs.end());
+    lease->left.resize(std::min(lease->left.size(), kMostLeft));
   } else {
     for (const Digest& blob : attempt.blobs) blobs_.discard(blob);
   }

@@ -57,8 +57,12 @@ void TaskBook::count_run(const JobGraph& graph, TaskIndex task, bool opened) {
 }
 
 std::uint32_t TaskBook::grant(const JobGraph& graph, TaskIndex task) {
-  BATON_CHECK(apply(graph, task, TaskEvent::granted));
+  take_up(graph, task);
   return ++record(task).attempts;
+}
+
+void TaskBook::take_up(const JobGraph& graph, TaskIndex task) {
+  BATON_CHECK(apply(graph, task, TaskEvent::granted));
 }
 
 void TaskBook::add_input(const JobGraph& graph, TaskIndex task) {

@@ -39,6 +39,10 @@ class TaskBook {
   bool apply(const JobGraph& graph, TaskIndex task, TaskEvent event);
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(const JobGraph& graph, TaskIndex task);
+  /// Leases a ready task once more by an attempt that was granted before.
+  void take_up(const JobGraph& graph, TaskIndex task);
+  /// How often it was granted.
+  std::uint32_t attempts(TaskIndex task) const { return record(task).attempts; }
   /// An input of the task is done: with the last one it is ready.
   void add_input(const JobGraph& graph, TaskIndex task);
   /// An input of the task is not done any more.

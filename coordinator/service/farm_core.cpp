@@ -24,7 +24,6 @@ using Clock = std::chrono::steady_clock;
 /// After which a worker that got less than it requested may ask again.
 constexpr std::int32_t kRetryMs = 250;
 constexpr int kMaxFailuresShown = 100;
-constexpr std::size_t kMaxRemoved = 1 << 16;
 
 }  // namespace
 
@@ -51,20 +50,10 @@ Status FarmCore::let_out() {
     std::error_code error;  // where it cannot be removed, it could not be written
     if (!marked_.contains(job)) fs::remove(mark, error);
   }
-  for (const Digest& blob : std::exchange(garbage_, {})) {
+  return garbage.remove_some(store, [this](const Digest& blob) -> Result<bool> {
     BATON_ASSIGN(const bool is_kept, journal.is_kept(blob));
-    const bool stays = is_kept || scheduler.is_referenced(blob);
-    const Status removed = stays ? Status() : store.remove(blob);
-    if (!removed && unremoved_.empty()) spdlog::warn("{}; tried again", removed.error().message);
-    if (removed_.size() >= kMaxRemoved) removed_.clear();
-    if (removed && !stays) removed_.insert(blob);
-    if (removed) {
-      unremoved_.erase(blob);
-    } else {
-      unremoved_.insert(blob);
-    }
-  }
-  return {};
+    return is_kept || scheduler.is_referenced(blob);
+  });
 }
 
 Status FarmCore::step(const Event& event) {
@@ -294,7 +283,7 @@ Status FarmCore::perform(const ReportConflict& action) {
 }
 
 Status FarmCore::perform(const RemoveBlobs& action) {
-  garbage_.insert(garbage_.end(), action.blobs.begin(), action.blobs.end());
+  garbage.add(action.blobs);
   return {};
 }
 

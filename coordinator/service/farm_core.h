@@ -16,6 +16,7 @@
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/service/file_reader.h"
 #include "coordinator/service/folder_record.h"
+#include "coordinator/service/garbage.h"
 #include "coordinator/service/history.h"
 #include "coordinator/service/locked_frames.h"
 #include "coordinator/service/peers.h"
@@ -33,6 +34,8 @@ struct ServiceOptions {
   ServerAccess access = {};  ///< who is let in
   /// Folders that jobs may read from and write to.
   Roots roots = {};
+  /// The highest that a user's key may give; an admin's may give any.
+  std::int32_t user_priority = limits::kMaxUserPriority;
   /// Bytes that blobs may take; 0: as the disk has room.
   std::uint64_t store_limit = 0;
   std::chrono::milliseconds clean_up_every =
@@ -66,6 +69,7 @@ class FarmCore {
   /// What workers say of the files of living jobs.
   std::map<Digest, std::vector<std::string>> notes;
   std::map<Digest, std::vector<std::string>> lost_before;  ///< what open jobs lacked at the start
+  Garbage garbage;
   /// Jobs whose frames are to be compared with the record, and when.
   std::map<Digest, TimePoint> to_inspect;
 
@@ -77,15 +81,6 @@ class FarmCore {
   Status step(const Event& event);
   /// Sends what waited for the commit, and removes blobs that nobody needs.
   Status let_out();
-  /// Blobs that the disk would not let go are tried again.
-  void retry_removals() { garbage_.insert(garbage_.end(), unremoved_.begin(), unremoved_.end()); }
-  /// Whether the blob was removed here, of late: it is not late, but equal to one that nobody
-  /// needed.
-  bool has_removed(const Digest& blob) const { return removed_.contains(blob); }
-  /// Blobs that nobody may need any more: they go at the end of the turn.
-  void discard(const std::vector<Digest>& blobs) {
-    garbage_.insert(garbage_.end(), blobs.begin(), blobs.end());
-  }
 
   // What is answered waits for the end of the turn; these never fail.
   Status reply(const PeerId& peer, Message message);
@@ -166,11 +161,7 @@ class FarmCore {
     PeerId peer;
     Message message;
   };
-  std::vector<Outgoing> outbox_;  ///< waits for the commit
-  std::vector<Digest> garbage_;   ///< likewise
-  std::set<Digest> unremoved_;    ///< that the disk would not let go
-  /// What was removed of late: up to kMaxRemoved, then forgotten all at once.
-  std::set<Digest> removed_;
+  std::vector<Outgoing> outbox_;                      ///< waits for the commit
   std::vector<Digest> ended_;                         ///< jobs to be archived
   std::set<Digest> marked_;                           ///< open jobs whose output folder is marked
   std::map<Digest, std::filesystem::path> unmarked_;  ///< marks that go after the commit

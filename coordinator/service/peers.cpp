@@ -8,13 +8,13 @@
 
 namespace baton {
 
-void Peers::add(const PeerId& peer, const WorkerHello& hello) {
+void Peers::add(const PeerId& peer, const WorkerHello& hello, const std::string& bearer) {
   const auto before = workers_.find(hello.worker_id);
   const bool drains = before != workers_.end() && before->second.is_draining &&
                       before->second.hello.instance == hello.instance;
   remove(worker_of(peer));
   remove(hello.worker_id);
-  workers_[hello.worker_id] = {peer, hello, drains};
+  workers_[hello.worker_id] = {peer, hello, bearer, drains};
   names_[peer] = hello.worker_id;
   turned_away_.remove(hello);
 }
@@ -31,6 +31,11 @@ std::string Peers::id_for(const WorkerHello& hello) const {
   if (other == workers_.end() || other->second.hello.instance == hello.instance)
     return hello.worker_id;
   return fmt::format("{}#{:08x}", hello.worker_id, static_cast<std::uint32_t>(hello.instance));
+}
+
+bool Peers::is_of_another(const std::string& worker, const std::string& bearer) const {
+  const auto known = workers_.find(worker);
+  return known != workers_.end() && known->second.bearer != bearer;
 }
 
 std::string Peers::worker_of(const PeerId& peer) const {

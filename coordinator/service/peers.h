@@ -14,8 +14,10 @@ namespace baton {
 /// Which connection belongs to which worker. A worker that connects again takes its name along.
 class Peers {
  public:
-  /// Introduces or replaces a worker.
-  void add(const PeerId& peer, const WorkerHello& hello);
+  /// Introduces or replaces a worker. bearer: the name of its key; empty: without one.
+  void add(const PeerId& peer, const WorkerHello& hello, const std::string& bearer);
+  /// Whether somebody with another key goes by this ID.
+  bool is_of_another(const std::string& worker, const std::string& bearer) const;
   void remove(const std::string& worker);
   /// It may not come in now. Returns when it asked first.
   TimePoint turn_away(const WorkerHello& hello, const std::string& reason, TimePoint now) {
@@ -45,6 +47,7 @@ class Peers {
   struct Entry {
     PeerId peer;
     WorkerHello hello;
+    std::string bearer;
     bool is_draining = false;
   };
   std::map<std::string, Entry> workers_;

@@ -1,6 +1,8 @@
 #pragma once
 
-#include <type_traits>
+#include <fmt/format.h>
+
+#include <cstdint>
 
 #include "common/protocol/keys.h"
 #include "common/protocol/messages.h"
@@ -13,38 +15,38 @@ enum class May : std::uint8_t { no, own, yes };
 /// What each role may say to a coordinator: the table.
 struct Rights {
   const char* what;
-  May worker, user, admin;
+  May worker, viewer, user, admin;
 };
 template <class M>
-inline constexpr Rights kRights{"say this", May::yes, May::yes,
+inline constexpr Rights kRights{"say this", May::yes, May::yes, May::yes,
                                 May::yes};  // refused as not for a coordinator
 
 // clang-format off
-//                                                                              worker    user      admin
-template <> inline constexpr Rights kRights<WorkerHello>        {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<LeaseRequest>       {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<Heartbeat>          {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<TaskDone>           {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<TaskFailed>         {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<StatesPublished>    {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<BlobsLeft>          {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<LeaseReturn>        {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<WorkerGoodbye>      {"work",          May::yes, May::no,  May::no};
-template <> inline constexpr Rights kRights<JobDocumentRequest> {"read jobs",     May::yes, May::own, May::yes};
-template <> inline constexpr Rights kRights<SubmitJob>          {"submit jobs",   May::no,  May::own, May::yes};
-template <> inline constexpr Rights kRights<ListJobs>           {"list jobs",     May::no,  May::yes, May::yes};
-template <> inline constexpr Rights kRights<ShowJob>            {"look at jobs",  May::no,  May::yes, May::yes};
-template <> inline constexpr Rights kRights<ListEvents>         {"list events",   May::no,  May::yes, May::yes};
-template <> inline constexpr Rights kRights<PauseJob>           {"pause jobs",    May::no,  May::own, May::yes};
-template <> inline constexpr Rights kRights<ResumeJob>          {"resume jobs",   May::no,  May::own, May::yes};
-template <> inline constexpr Rights kRights<CancelJob>          {"cancel jobs",   May::no,  May::own, May::yes};
-template <> inline constexpr Rights kRights<LockFrames>         {"lock frames",   May::no,  May::own, May::yes};
-template <> inline constexpr Rights kRights<SetPriority>        {"set priorities", May::no, May::own, May::yes};
-template <> inline constexpr Rights kRights<AskWhy>             {"ask why",       May::no,  May::yes, May::yes};
-template <> inline constexpr Rights kRights<ListTasks>          {"list tasks",    May::no,  May::yes, May::yes};
-template <> inline constexpr Rights kRights<DeleteJob>          {"delete jobs",   May::no,  May::own, May::yes};
-template <> inline constexpr Rights kRights<DrainWorker>        {"drain workers", May::no,  May::no,  May::yes};
-template <> inline constexpr Rights kRights<StopCoordinator>    {"stop the farm", May::no,  May::no,  May::yes};
+//                                                                              worker    viewer    user      admin
+template <> inline constexpr Rights kRights<WorkerHello>        {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<LeaseRequest>       {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<Heartbeat>          {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<TaskDone>           {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<TaskFailed>         {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<StatesPublished>    {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<BlobsLeft>          {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<LeaseReturn>        {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<WorkerGoodbye>      {"work",          May::yes, May::no,  May::no,  May::no};
+template <> inline constexpr Rights kRights<JobDocumentRequest> {"read jobs",     May::yes, May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<SubmitJob>          {"submit jobs",   May::no,  May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<ListJobs>           {"list jobs",     May::no,  May::yes, May::yes, May::yes};
+template <> inline constexpr Rights kRights<ShowJob>            {"look at jobs",  May::no,  May::yes, May::yes, May::yes};
+template <> inline constexpr Rights kRights<ListEvents>         {"list events",   May::no,  May::yes, May::yes, May::yes};
+template <> inline constexpr Rights kRights<PauseJob>           {"pause jobs",    May::no,  May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<ResumeJob>          {"resume jobs",   May::no,  May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<CancelJob>          {"cancel jobs",   May::no,  May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<LockFrames>         {"lock frames",   May::no,  May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<SetPriority>        {"set priorities", May::no, May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<AskWhy>             {"ask why",       May::no,  May::yes, May::yes, May::yes};
+template <> inline constexpr Rights kRights<ListTasks>          {"list tasks",    May::no,  May::yes, May::yes, May::yes};
+template <> inline constexpr Rights kRights<DeleteJob>          {"delete jobs",   May::no,  May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<DrainWorker>        {"drain workers", May::no,  May::no,  May::no,  May::yes};
+template <> inline constexpr Rights kRights<StopCoordinator>    {"stop the farm", May::no,  May::no,  May::no,  May::yes};
 // clang-format on
 
 /// What the speaker may do with a message of type M. Who has no name has no key: where there are no
@@ -53,9 +55,26 @@ template <class M>
 May may_say(const Speaker& speaker) {
   if (speaker.name.empty()) return May::yes;
   constexpr Rights rights = kRights<M>;
-  return speaker.role == Role::worker ? rights.worker
-         : speaker.role == Role::user ? rights.user
-                                      : rights.admin;
+  switch (speaker.role) {
+    case Role::worker:
+      return rights.worker;
+    case Role::viewer:
+      return rights.viewer;
+    case Role::user:
+      return rights.user;
+    case Role::admin:
+      break;
+  }
+  return rights.admin;
+}
+
+/// Error (usage): a user's key that may not give a job this priority. most: ServiceOptions.
+inline Status check_priority(const Speaker& speaker, std::int32_t priority, std::int32_t most) {
+  if (speaker.name.empty() || speaker.role != Role::user || priority <= most) return {};
+  return Error{ErrorKind::usage,
+               fmt::format("priority: user '{}' may give at most {} (--user-priority of the "
+                           "coordinator), got {}",
+                           speaker.name, most, priority)};
 }
 
 }  // namespace baton

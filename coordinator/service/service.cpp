@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxMessagesPerTurn = 1000;
+constexpr std::chrono::seconds kFarewell{2};
 constexpr std::chrono::milliseconds kTick{250};
 /// What comes again is told so often.
 constexpr std::chrono::minutes kTellInterval{1};
@@ -73,15 +74,19 @@ Result<Service> Service::open(const ServiceOptions& options) {
   BATON_ASSIGN(Router router, Router::bind(options.listen, options.access));
   Service service(std::make_unique<FarmCore>(options, std::move(router), std::move(journal),
                                              std::move(store), std::move(token)));
+  service.waits_ = std::make_unique<FileWaits>(
+      options.disk, [farm = service.owned_farm_.get()] { farm->router.wake(); });
   BATON_TRY(service.restore_jobs());
   BATON_TRY(service.farm_.history.happened(FarmEventKind::coordinator_started));
   return service;
 }
 
 Status Service::run(const std::atomic<bool>& stop) {
-  waits_ = std::make_unique<FileWaits>(farm_.options.disk, [this] { farm_.router.wake(); });
   while (!stop && !stop_requested_) BATON_TRY(turn());
   waits_.reset();
+  // What nobody needs goes as far as there is time; the rest is found later.
+  const TimePoint end = Clock::now() + kFarewell;
+  while (!farm_.garbage.empty() && Clock::now() < end) BATON_TRY(farm_.let_out());
   const std::vector<PeerId> workers = farm_.peers.connections();
   if (stop_requested_) {
     BATON_TRY(send_home());
@@ -115,23 +120,31 @@ Status Service::turn() {
   // Take what has arrived, or wait for the next tick.
   const auto until_tick = std::chrono::ceil<std::chrono::milliseconds>(next_tick_ - Clock::now());
   std::chrono::milliseconds timeout = std::clamp(until_tick, std::chrono::milliseconds(0), kTick);
+  if (!farm_.garbage.empty()) timeout = std::chrono::milliseconds(0);
   for (int i = 0; i < kMaxMessagesPerTurn; ++i) {
     const std::optional<Incoming> incoming = farm_.router.receive(timeout);
     if (!incoming) break;
     BATON_TRY(handle(*incoming));
     timeout = std::chrono::milliseconds(0);
   }
+  return end_turn();
+}
+
+Status Service::end_turn() {
   BATON_TRY(handle_read());
   farm_.history.set_actor({});
   start_inspections();
   if (Clock::now() >= next_tick_) {
     next_tick_ = Clock::now() + kTick;
     asked_for_hello_.clear();
-    tell_refusals();
+    if (const auto refusal = farm_.router.take_refusal()) tell("refused: " + refusal->message);
+    const auto keys = farm_.router.read_keys_again();
+    if (!keys) tell("keys stay as they were: " + keys.error().message);
+    if (keys && *keys) spdlog::info("{}", **keys);
     if (const auto lack = lack_of_descriptors()) tell("nobody else can connect for long: " + *lack);
     BATON_TRY(farm_.step(ClockTicked{}));
     if (Clock::now() >= next_clean_up_) BATON_TRY(clean_up());
-    farm_.retry_removals();
+    farm_.garbage.retry();
   }
 
   // First durable, then known to others.
@@ -154,6 +167,11 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   WorkerHello hello = message;
   hello.worker_id = farm_.peers.id_for(message);
   const bool is_new = farm_.peers.hello_of(hello.worker_id) == nullptr;
+  if (farm_.peers.is_of_another(hello.worker_id, speaker_.name)) {
+    tell(fmt::format("refused: '{}' says that it is worker {}, which has another key",
+                     speaker_.name, hello.worker_id));
+    return farm_.refuse(peer, {ErrorKind::usage, "this worker is connected with another key"});
+  }
   if (is_new && farm_.peers.num_workers() >= limits::kMaxWorkers) {
     return farm_.refuse(peer, {ErrorKind::timeout, fmt::format("the farm is full: {} workers",
                                                                farm_.peers.num_workers())});
@@ -170,7 +188,7 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
 
   // Answer before the leases that follow from it.
   farm_.keep_token();
-  farm_.peers.add(peer, hello);
+  farm_.peers.add(peer, hello, speaker_.name);
   if (is_new)
     spdlog::info("worker {} joined: {} threads on {}", hello.worker_id, hello.num_threads,
                  hello.host);
@@ -237,7 +255,7 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
   // What another machine has written may be seen here a moment later; the report is said again.
   const std::optional<ReportedFrame> frame = find_reported_frame(farm_, message);
   const std::optional<Digest> missing = find_missing_blob(farm_, message);
-  const bool is_late = missing && !farm_.has_removed(*missing);
+  const bool is_late = missing && !farm_.garbage.has_removed(*missing);
   BATON_ASSIGN(const bool is_elsewhere, frame ? watch_folder(message.lease.job) : false);
   const bool is_frame_there = !frame || (frame->stamp && *frame->stamp);
   if ((is_late || !is_frame_there) && !is_elsewhere && await_outputs(message)) return {};
@@ -416,12 +434,6 @@ Result<Digest> Service::resolve_own(const std::string& text) {
     return own.error();
   }
   return job;
-}
-
-/// Logs which connections were refused.
-void Service::tell_refusals() {
-  const std::optional<Error> refusal = farm_.router.take_refusal();
-  if (refusal) tell("refused: " + refusal->message);
 }
 
 /// Logs what may come again and again, as when a stranger tries.

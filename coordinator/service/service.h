@@ -37,6 +37,9 @@ class Service {
   /// the journal) means that nothing can be promised any more: everything committed is safe, start
   /// again.
   Status run(const std::atomic<bool>& stop);
+  /// What run() does with a message, and at the end of a turn: for tests without connections.
+  Status handle(const Incoming& incoming);
+  Status end_turn();
 
  private:
   explicit Service(std::unique_ptr<FarmCore> farm)
@@ -47,7 +50,6 @@ class Service {
   Status clean_up();
   Status turn();
   Status send_home();
-  Status handle(const Incoming& incoming);
 
   // Messages of workers.
   Status receive(const PeerId& peer, const WorkerHello& message);
@@ -67,7 +69,6 @@ class Service {
   template <class M>
   Status forbid(const PeerId& peer);
   Result<Digest> resolve_own(const std::string& text);
-  void tell_refusals();
   void tell(const std::string& warning);
 
   // What people, and workers, do with jobs (service_jobs.cpp).
@@ -129,8 +130,8 @@ class Service {
     TimePoint since, seen;
   };
   std::map<Digest, Unreadable> unreadable_;
-  FileTable files_;                   ///< frames, and inputs of failed attempts
-  std::unique_ptr<FileWaits> waits_;  ///< made by run()
+  FileTable files_;  ///< frames, and inputs of failed attempts
+  std::unique_ptr<FileWaits> waits_;
 };
 
 }  // namespace baton

@@ -18,6 +18,7 @@
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/lock_keeper.h"
+#include "coordinator/service/permissions.h"
 #include "coordinator/service/plan_text.h"
 #include "coordinator/service/service.h"
 #include "coordinator/service/submission.h"
@@ -196,6 +197,10 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
     return farm_.refuse(peer, within.error());
   }
+  if (const Status may =
+          check_priority(speaker_, document->job.priority, farm_.options.user_priority);
+      !may)
+    return farm_.refuse(peer, may.error());
   Submission submission(farm_, files_, speaker_);
   SubmitJob wanted = message;
   BATON_ASSIGN(wanted.json,
@@ -396,6 +401,9 @@ Status Service::receive(const PeerId& peer, const SetPriority& message) {
                         {ErrorKind::usage, fmt::format("priority: expected 0 to {}, got {}",
                                                        limits::kMaxPriority, message.priority)});
   }
+  if (const Status may = check_priority(speaker_, message.priority, farm_.options.user_priority);
+      !may)
+    return farm_.refuse(peer, may.error());
   BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
   const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
   if (!document) return farm_.refuse(peer, document.error());
@@ -426,7 +434,7 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   for (const Digest& version : farm_.history.jobs().versions(id)) {
     BATON_TRY(farm_.archive_job(version));
     BATON_ASSIGN(const std::vector<Digest> kept, farm_.journal.kept_blobs(version));
-    farm_.discard(kept);
+    farm_.garbage.add(kept);
     BATON_TRY(farm_.journal.delete_job(version));
     farm_.owners.erase(version);
     farm_.remove_job_file(version, JobStatus::cancelled);

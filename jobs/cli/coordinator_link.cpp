@@ -10,7 +10,7 @@
 namespace baton {
 
 Result<RequestClient> CoordinatorLink::connect() const {
-  BATON_ASSIGN(const ClientAccess access, client_access(key_file, insecure));
+  BATON_ASSIGN(const ClientAccess access, client_access(key_file, insecure, endpoint));
   return RequestClient::connect(endpoint, access);
 }
 
@@ -20,7 +20,7 @@ void add_coordinator_options(CLI::App& command, CoordinatorLink& link) {
       ->capture_default_str();
   command.add_option("--key", link.key_file, "user.key or admin.key of `baton key create`")
       ->envname("BATON_KEY");
-  command.add_flag("--insecure", link.insecure, "connect to another machine without a key");
+  command.add_flag("--insecure", link.insecure, "connect without a key");
 }
 
 void print_pending(const RequestClient& client, std::set<std::string>& printed) {

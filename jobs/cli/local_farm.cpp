@@ -38,6 +38,15 @@ std::uint64_t memory_mib_of_each(const FarmOptions& options) {
   return std::max<std::uint64_t>(1, (all >> 20) / static_cast<std::uint64_t>(options.workers));
 }
 
+/// Programs append to their logs: one that has grown long goes on empty, and is kept once.
+void put_aside_long(const fs::path& log) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(log, error);
+  if (error || size <= limits::kMaxLogBytes) return;
+  fs::copy_file(log, log.string() + ".1", fs::copy_options::overwrite_existing, error);
+  if (!error) fs::resize_file(log, 0, error);
+}
+
 /// Of a farm that was killed in this work folder.
 void remove_left_socket(const fs::path& endpoint_file) {
   constexpr std::string_view kScheme = "ipc://";
@@ -108,7 +117,9 @@ Status LocalFarm::start_coordinator(const std::string& program) {
                                    options_.work_directory.string(),
                                    "--endpoint-file",
                                    endpoint_file.string()};
-  if (!options_.server_key.empty()) command.insert(command.end(), {"--key", options_.server_key});
+  // The keys of such a farm are those of its user, who may do what the account may.
+  if (!options_.server_key.empty())
+    command.insert(command.end(), {"--key", options_.server_key, "--root", "/"});
   if (options_.store_limit_mib > 0)
     command.insert(command.end(), {"--store-limit", std::to_string(options_.store_limit_mib)});
   BATON_TRY(add_member("coordinator", std::move(command)));
@@ -140,6 +151,7 @@ Status LocalFarm::add_member(const std::string& name, std::vector<std::string> c
 
 Status LocalFarm::tend() {
   for (Member& member : members_) {
+    put_aside_long(log_of(member.name));
     const std::optional<std::string> end = member.process.ended();
     if (!end) continue;
     const std::string log = log_of(member.name).string();

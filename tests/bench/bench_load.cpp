@@ -77,6 +77,7 @@ Result<ChildProcess> start_coordinator(const LoadOptions& options, const std::st
                                    "--listen",   endpoint,     "--endpoint-file",
                                    file.string()};
   if (options.keys) command.insert(command.end(), {"--key", keys_of(options) / "server.key"});
+  if (!options.keys) command.emplace_back("--insecure");
   BATON_ASSIGN(ChildProcess process,
                ChildProcess::start(command, options.work_dir / "coordinator.log"));
   while (!fs::exists(file)) {
@@ -166,7 +167,7 @@ Result<Figures> measure(const LoadOptions& options) {
   std::optional<ClientKey> worker_key;
   if (options.keys) {
     BATON_TRY(create_keys(keys_of(options)));
-    BATON_ASSIGN(access, client_access((keys_of(options) / "admin.key").string(), false));
+    BATON_ASSIGN(access, client_access((keys_of(options) / "admin.key").string(), false, {}));
     BATON_ASSIGN(worker_key, read_client_key(keys_of(options) / "worker.key"));
   }
 

@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "common/base/files.h"
 #include "common/base/members.h"
@@ -159,6 +162,68 @@ Status write_messages(const fs::path& folder, std::index_sequence<Types...>) {
   return status;
 }
 
+// ---- conversations with a coordinator -----------------------------------------------------------
+
+/// As fuzz_service.cpp reads it: who speaks, and what is said.
+void add_words(Bytes& input, int peer, const Message& message) {
+  const std::vector<Bytes> frames = encode_message(message);
+  const auto length = static_cast<std::uint16_t>(frames[2].size());
+  input.push_back(static_cast<std::byte>(peer));
+  input.insert(input.end(), frames[1].begin(), frames[1].end());
+  for (int shift = 0; shift < 16; shift += 8)
+    input.push_back(static_cast<std::byte>(length >> shift));
+  input.insert(input.end(), frames[2].begin(), frames[2].end());
+}
+
+Status write_conversations(const fs::path& folder) {
+  constexpr Digest kJob{0xaaaaaaaaaaaaaaaa, 0xaaaaaaaaaaaaaaaa};
+  constexpr int kWorker = 0, kOther = 1, kViewer = 3, kOwner = 4, kAdmin = 6;
+  const std::string id = kJob.hex();
+  const LeaseId lease{kJob, render_task(Run(0), 0), 1, 1},
+      never{kJob, render_task(Run(1), 1), 9, 1};
+  const BlobRef film{BlobKind::film, 0, 0, {1, 2}, 3}, state{BlobKind::state, 1, 0, {3, 4}, 5};
+  TaskDone done{lease, {}};
+  done.made.outputs = {film, {BlobKind::film, 1, 0, {5, 6}, 3}, state};
+  done.made.frames = {{0, 0, {}}, {1, 0, {}}};
+  using Words = std::vector<std::pair<int, Message>>;
+  AskWhy why;
+  why.job = id;
+  const std::map<std::string, Words> conversations{
+      {"work", Words{{kWorker, Heartbeat{{lease}}},
+                     {kWorker, done},
+                     {kWorker, LeaseRequest{2}},
+                     {kWorker, BlobsLeft{lease, {{7, 8}}}},
+                     {kWorker, StatesPublished{kJob, {{state, state}}}}}},
+      {"failures", Words{{kWorker, TaskFailed{lease, "boom", false, false}},
+                         {kOther, TaskFailed{never, "never granted", true, false}},
+                         {kOther, Heartbeat{{never, lease}}},
+                         {kOther, TaskFailed{lease, "full", false, true}},
+                         {kWorker, LeaseReturn{lease, {}, {}, {}, {}}},
+                         {kWorker, WorkerGoodbye{}}}},
+      {"questions", Words{{kViewer, ListJobs{}},
+                          {kViewer, ShowJob{id}},
+                          {kViewer, why},
+                          {kViewer, ListTasks{id}},
+                          {kViewer, ListEvents{}},
+                          {kWorker, JobDocumentRequest{kJob}}}},
+      {"orders", Words{{kOwner, PauseJob{id}},
+                       {kOwner, ResumeJob{id}},
+                       {kOwner, SetPriority{id, 60}},
+                       {kOwner, LockFrames{id, {FrameNumber(2)}, false}},
+                       {kAdmin, DrainWorker{"one"}},
+                       {kAdmin, CancelJob{id}},
+                       {kAdmin, DeleteJob{id}},
+                       {kAdmin, StopCoordinator{}}}},
+      {"documents", Words{{kOwner, SubmitJob{"{}", false, false}},
+                          {kAdmin, SubmitJob{R"({"job": {}, "assets": []})", true, false}}}}};
+  for (const auto& [name, words] : conversations) {
+    Bytes input;
+    for (const auto& [peer, message] : words) add_words(input, peer, message);
+    BATON_TRY(write_file_atomic(folder / name, input));
+  }
+  return {};
+}
+
 // ---- images -------------------------------------------------------------------------------------
 
 Status write_images(const fs::path& folder) {
@@ -188,6 +253,7 @@ Status write_corpora(const fs::path& folder) {
   BATON_TRY(write_first_passes(folder / "first_pass"));
   BATON_TRY(write_messages(folder / "messages",
                            std::make_index_sequence<std::variant_size_v<Message>>()));
+  BATON_TRY(write_conversations(folder / "service"));
   return write_images(folder / "images");
 }
 

@@ -93,10 +93,29 @@ def number_faults(root):
             yield f"{page}: says {says[0] if says else 'nothing'}, {source} {is_in[0] if is_in else 'nothing'}"
 
 
+# A row of the table of rights, in the code and on the page: the message, and what each role may.
+RIGHT = re.compile(r'kRights<(\w+)>\s+\{"[^"]+",' + r"\s*May::(\w+),?" * 4)
+SAID_RIGHT = re.compile(r"^\| `(\w+)`" + r" \| (no|own|yes)" * 4 + r" \|$", re.MULTILINE)
+
+
+def right_faults(root):
+    """Yields what SECURITY.md says otherwise of the rights of keys than the program has them."""
+    page, source = root / "SECURITY.md", root / "coordinator/service/permissions.h"
+    if not (page.exists() and source.exists()):
+        return
+    said = {row[0]: row[1:] for row in SAID_RIGHT.findall(page.read_text(encoding="utf-8"))}
+    meant = {row[0]: row[1:] for row in RIGHT.findall(source.read_text(encoding="utf-8"))}
+    for message in sorted({*said, *meant}):
+        if said.get(message) != meant.get(message):
+            yield f"SECURITY.md: {message}: says {said.get(message)}, permissions.h {meant.get(message)}"
+    if not meant:
+        yield "coordinator/service/permissions.h: no table of rights"
+
+
 def faults(root):
     root = root.resolve()
-    linked = {*tables.pages(root), *(page for folder in FOLDERS for page in (root / folder).rglob("*.md"))}
-    found = [*tables.faults(root), *length_faults(root), *number_faults(root)]
+    linked = {*tables.pages(root), *root.glob("SECURITY.md"), *(page for folder in FOLDERS for page in (root / folder).rglob("*.md"))}
+    found = [*tables.faults(root), *length_faults(root), *number_faults(root), *right_faults(root)]
     for page in sorted(linked):
         found += [*link_faults(root, page), *file_faults(root, page)]
     return found
@@ -127,6 +146,8 @@ TREE = {
     "ARCHITECTURE.md": "# How it is built\n",
     "common/protocol/PROTOCOL.md": "# The protocol\n\nversion is 7\n",
     "common/protocol/messages.h": "kProtocolVersion = 7;\n",
+    "SECURITY.md": "| `Look` | no | yes | own | yes |\n",
+    "coordinator/service/permissions.h": 'kRights<Look> {"look", May::no, May::yes, May::own, May::yes};\n',
 }
 # A planted fault: file, what is replaced, by what, and what the message must contain.
 PLANTED = [
@@ -143,6 +164,8 @@ PLANTED = [
     ("docs/page.md", "# A page\n", "# A page\n" + "word " * (PAGE_WORDS + 1), f"words, at most {PAGE_WORDS}"),
     ("ARCHITECTURE.md", "# How", "word " * ARCHITECTURE_WORDS + "# How", f"at most {ARCHITECTURE_WORDS}"),
     ("common/protocol/messages.h", "= 7", "= 8", "says version is 7"),
+    ("SECURITY.md", "| own |", "| yes |", "Look: says"),
+    ("coordinator/service/permissions.h", "<Look>", "<Change>", "Change: says None"),
     ("jobs/lab/manifest.json", '"measures": ["docs"]', '"measures": ["gone"]', "names gone, which is not there"),
     ("jobs/lab/manifest.json", '"docs/page.md"', '"docs/lab/other.md"', "says it is on"),
     ("jobs/lab/manifest.json", '"docs/lab/tables/times.csv"], "measures"', '"docs/lab/made.csv"], "measures"', "no entry makes"),

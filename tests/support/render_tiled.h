@@ -28,7 +28,8 @@ inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_le
   job.image.tile_size = tile_size;
   job.state.checkpoint_every = run_length;
   const auto assets =
-      load_shared_assets(job, memory, std::numeric_limits<std::uint64_t>::max()).value();
+      load_shared_assets(job, memory, std::numeric_limits<std::uint64_t>::max(), FilesBeside::any)
+          .value();
   const auto context = make_render_context(job, Digest{1, 2}, assets, memory);
   EXPECT_TRUE(context.ok());
   std::vector<FilmTile> images(job.frames.size());

@@ -84,6 +84,7 @@ def run(programs, folder, num_faults, seed, longest_freeze_s=5):
         if disk:
             stack.callback(disk.close)
         farm = stack.enter_context(Farm(programs, folder / "farm", workers=None))
+        farm.insecure = True  # the proxy is at another address
         power = PowerCut(programs, farm.folder) if Path(programs.path("libsync_witness.so")).exists() else None
         farm.environment = power.environment if power else {}
         farm.start_coordinator()

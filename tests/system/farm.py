@@ -1,6 +1,7 @@
 """Starts the real programs on loopback, with deadlines, and looks at what they made. Standard library only."""
 
 import argparse
+import atexit
 import contextlib
 import inspect
 import json
@@ -24,6 +25,11 @@ from png_files import leave_pictures
 # Generous: a busy machine must not fail a test. Builds with sanitizers ask for more patience.
 PATIENCE = int(os.environ.get("BATON_PATIENCE", "1"))
 DEADLINE_S = 120 * PATIENCE
+
+# Where the programs look for keys that a coordinator has made for itself: not among those of whoever runs the tests.
+STATE_FOLDER = tempfile.mkdtemp(prefix="baton-state-")
+os.environ["XDG_STATE_HOME"] = STATE_FOLDER
+atexit.register(shutil.rmtree, STATE_FOLDER, ignore_errors=True)
 
 OK, FAILED, USAGE, BAD_INPUT, UNAVAILABLE, IO = 0, 2, 64, 65, 69, 74
 
@@ -193,6 +199,7 @@ class Farm:
         self.work_folder = self.folder / "work"
         self.endpoint = None
         self.worker_endpoint = None  # where workers connect to, if not there
+        self.insecure = False        # without keys: for proxies, and for who speaks the protocol by himself
         self.environment = {}        # of coordinator and workers
         self.coordinator = None
         self.workers = []
@@ -218,7 +225,7 @@ class Farm:
         """Starts it, or starts it again on the same port and folder. extra: more arguments."""
         self.endpoint = f"tcp://127.0.0.1:{self._port}"
         command = [self.programs.path("baton-coordinator"), "--listen", self.endpoint,
-                   "--work-dir", str(self.work_folder), *map(str, extra)]
+                   "--work-dir", str(self.work_folder), *(["--insecure"] if self.insecure else []), *map(str, extra)]
         self.coordinator = Process(command, self.folder / "coordinator.log", self.environment)
         wait_until(lambda: self.baton("job", "list", expect=None, deadline_s=20).returncode == OK,
                    "the coordinator answers")

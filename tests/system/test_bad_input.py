@@ -87,7 +87,9 @@ def _state_magic(programs, folder):
 
 def a_live_coordinator_survives_any_message(programs, folder):
     """Messages of another version, cut, too long or of no meaning, and plain bytes: the next job is rendered."""
-    with Farm(programs, folder / "farm") as farm:
+    with Farm(programs, folder / "farm", workers=None) as farm:
+        farm.insecure = True
+        farm.start_coordinator()
         worker = farm.start_worker()
         for kind in ["version", "garbage", "empty", "short", "many"]:
             answer = programs.run("send_raw", farm.endpoint, kind).stdout

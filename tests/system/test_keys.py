@@ -8,7 +8,7 @@ import shutil
 import time
 from pathlib import Path
 
-from farm import BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
+from farm import BAD_INPUT, DEADLINE_S, OK, STATE_FOLDER, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
 
 
@@ -36,6 +36,17 @@ class KeyedFarm(Farm):
                                      "--name", name, "--key", self.key(key), *self.worker_options],
                                     self.folder / f"{name}-{len(self.workers)}.log"))
         return self.workers[-1]
+
+    def let_in(self, name):
+        """Waits until the coordinator has read its list again, and knows the key."""
+        wait_until(lambda: self.speak(name, "job", "list", expect=None).returncode == OK, f"{name} is let in")
+
+    def shut_out(self, name):
+        """Takes the key off the list, and waits until the coordinator knows it no more."""
+        server = Path(self.key("server"))
+        lines = server.read_text().splitlines(keepends=True)
+        server.write_text("".join(line for line in lines if line.split()[2:3] != [name]))
+        wait_until(lambda: re.search(rf"shut out:.* {name}", self.coordinator.log()), f"{name} is shut out")
 
     def speak(self, key, *words, **options):
         """The command line with one of the keys."""
@@ -111,7 +122,10 @@ def without_the_right_key_nobody_comes_in(programs, folder):
         for options in (["--key", folder / "other/admin.key"], []):
             answer = farm.baton("job", "list", *options, expect=UNAVAILABLE)
             check("either side may lack a key" in answer.stderr, answer.stderr)
+        # One that is in no list; and one that is taken off it.
         programs.run("baton", "key", "add", farm.keys, "late", "--role", "admin")
+        farm.let_in("late")
+        farm.shut_out("late")
         farm.refused("late", "job", "list", says="the coordinator does not know this key")
         late = farm.start_worker("late", key="late")
         check_equal(late.wait(), USAGE, "exit code of a worker whose key is not known")
@@ -119,21 +133,96 @@ def without_the_right_key_nobody_comes_in(programs, folder):
         for line in ("refused: a connection from 127.0.0.1: its key is not known here",
                      "refused: a connection: it has no key, or not one for this coordinator"):
             wait_until(lambda line=line: line in farm.coordinator.log(), f"the log has: {line}")
-        # Who reads the file of keys anew knows the new one.
-        farm.coordinator.kill()
+
+
+def a_key_that_is_shut_out_works_no_more(programs, folder):
+    """Who is connected is shut out, too; what it had in hand others do. A list that cannot be read changes nothing."""
+    with KeyedFarm(programs, folder) as farm:
         farm.start_coordinator()
-        farm.speak("late", "job", "list")
+        programs.run("baton", "key", "add", farm.keys, "node7", "--role", "worker")
+        farm.let_in("admin")
+        wait_until(lambda: "let in: node7" in farm.coordinator.log(), "the list was read again")
+        lost = farm.start_worker("lost", key="node7")
+        job = json.loads(farm.speak("user", "job", "submit", small(folder / "job", quality={"rounds": 40}), "--json").stdout)["id"]
+        wait_until(lambda: '"leases": 1' in farm.speak("viewer", "worker", "list", "--json").stdout, "it has a task")
+        farm.shut_out("node7")
+        check_equal(lost.wait(), USAGE, "exit code of a worker whose key is shut out")
+        check_says(lost.log(), "does not know this key any more")
+        server = Path(farm.key("server"))
+        good = server.read_text()
+        server.write_text(good + "knows nobody\n")
+        wait_until(lambda: "keys stay as they were" in farm.coordinator.log(), "the fault is told")
+        farm.start_worker()
+        farm.speak("user", "job", "wait", job)
+
+
+def a_viewer_looks_and_changes_nothing(programs, folder):
+    path = small(folder / "job")
+    with KeyedFarm(programs, folder, ["--user-priority", "60"]) as farm:
+        farm.start_coordinator()
+        job = json.loads(farm.speak("user", "job", "submit", path, "--json").stdout)["id"]
+        for words in (["job", "list"], ["job", "show", job], ["job", "why", job], ["job", "tasks", job], ["worker", "list"],
+                      ["farm", "events"], ["top", "--count", "1"]):
+            farm.speak("viewer", *words)
+        for words, what in ((["job", "submit", path], "submit jobs"), (["job", "cancel", job], "cancel jobs"),
+                            (["job", "pause", job], "pause jobs"), (["job", "set", job, "priority=1"], "set priorities"),
+                            (["job", "delete", job], "delete jobs"), (["farm", "stop", "--yes"], "stop the farm")):
+            farm.refused("viewer", *words, says=f"viewer 'viewer' may not {what}")
+        check_equal(farm.start_worker("viewer", key="viewer").wait(), USAGE, "exit code of a worker with a viewer's key")
+
+        # A user's priority has a limit, wherever it is said; an admin's has not.
+        says = "priority: user 'user' may give at most 60 (--user-priority of the coordinator), got"
+        farm.refused("user", "job", "set", job, "priority=61", says=says)
+        farm.refused("user", "job", "submit", small(folder / "job", priority=100), says=says)
+        farm.speak("user", "job", "set", job, "priority=60")
+        farm.speak("admin", "job", "set", job, "priority=100")
+
+
+def other_users_of_the_machine_have_no_key(programs, folder):
+    """A coordinator on a loopback address makes keys, which programs of its user find, and nobody else."""
+    path = small(folder / "job")
+    with Farm(programs, folder / "farm", workers=None) as farm:
+        # Before there is a coordinator; and through another one with other keys in its place.
+        farm.endpoint = f"tcp://127.0.0.1:{farm._port}"
+        early = farm.start_worker(name="early")
+        farm.start_coordinator()
+        key = farm.work_folder / "own-keys/admin.key"
+        check_equal(key.stat().st_mode & 0o777, 0o600, "who may read the key")
+        os.environ["XDG_STATE_HOME"] = str(folder / "another user")
+        try:
+            for words in (["job", "list"], ["farm", "stop", "--yes"], ["job", "submit", path]):
+                check_says(farm.baton(*words, expect=UNAVAILABLE).stderr, "either side may lack a key")
+            farm.baton("job", "list", "--key", key)  # who is given the key is let in
+        finally:
+            os.environ["XDG_STATE_HOME"] = STATE_FOLDER
+        farm.wait_for(farm.submit(path))
+        farm.coordinator.kill()
+        shutil.rmtree(farm.work_folder / "own-keys")
+        farm.start_coordinator()
+        shutil.rmtree(folder / "job/frames")
+        farm.wait_for(farm.submit(path))
+        check(early.alive(), early.log())
+
+        # Without keys for those who say so, and back.
+        for insecure in (True, False):
+            farm.coordinator.kill()
+            farm.insecure = insecure
+            farm.start_coordinator()
+            shutil.rmtree(folder / "job/frames")
+            farm.wait_for(farm.submit(path))
 
 
 def other_machines_need_keys(programs, folder):
     folder.mkdir(parents=True)
-    for program, *words in (("baton-coordinator", "--listen", "tcp://*:*", "--work-dir", folder / "work"),
+    for program, *words in (("baton-coordinator", "--listen", "tcp://*:*", "--work-dir", folder / "work", "--root", "/"),
                             ("baton-worker", "--coordinator", "tcp://192.0.2.1:5570"),
                             ("baton", "job", "list", "--coordinator", "tcp://192.0.2.1:5570")):
         refused = programs.run(program, *words, expect=USAGE)
         check("other machines reach it, so it needs a key" in refused.stderr + refused.stdout, refused.stderr)
+    refused = programs.run("baton-coordinator", "--listen", "tcp://*:*", "--work-dir", folder / "work", "--insecure", expect=USAGE)
+    check_says(refused.stderr + refused.stdout, "other machines reach it: --root FOLDER says where jobs may read and write")
     coordinator = Process([programs.path("baton-coordinator"), "--listen", "tcp://*:*", "--work-dir", str(folder / "work"),
-                           "--insecure"], folder / "insecure.log")
+                           "--insecure", "--root", "/"], folder / "insecure.log")
     wait_until(lambda: "listening on" in coordinator.log(), "it listens all the same")
     coordinator.kill()
     check("INSECURE" in coordinator.log(), coordinator.log())

@@ -9,9 +9,10 @@ namespace baton {
 
 Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job,
                                                                const MemoryBudget& memory,
-                                                               std::uint64_t max_scene_bytes) {
+                                                               std::uint64_t max_scene_bytes,
+                                                               FilesBeside beside) {
   auto assets = std::make_shared<SharedAssets>();
-  BATON_ASSIGN(assets->scene, load_scene(job));
+  BATON_ASSIGN(assets->scene, load_scene(job, beside));
   const std::uint64_t scene_bytes = assets->scene.size_bytes();
   const std::uint64_t room = max_scene_bytes - std::min(max_scene_bytes, scene_bytes);
   Result<std::unique_ptr<Accel>> accel = Accel::build(assets->scene, {.max_bytes = room});
@@ -31,7 +32,7 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
 
 Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job) {
   const MemoryBudget memory = MemoryBudget::of_machine();
-  return load_shared_assets(job, memory, memory.scene_bytes);
+  return load_shared_assets(job, memory, memory.scene_bytes, FilesBeside::any);
 }
 
 Status verify_asset(const std::vector<KnownAsset>& files, const std::string& path) {
@@ -44,7 +45,7 @@ Status verify_asset(const std::vector<KnownAsset>& files, const std::string& pat
 
 AssetShelf::AssetShelf()
     : AssetShelf([](const JobSpec& job, const MemoryBudget& memory, std::uint64_t most) {
-        return load_shared_assets(job, memory, most);
+        return load_shared_assets(job, memory, most, FilesBeside::listed);
       }) {}
 
 Result<std::shared_ptr<const SharedAssets>> AssetShelf::get(const JobSpec& job,

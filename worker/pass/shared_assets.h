@@ -32,9 +32,11 @@ struct SharedAssets {
 /// Loads meshes and materials and builds the ray tracer; maps are read when they are asked for.
 /// memory: whose share the maps use. Errors name the file and what was expected; several faults are
 /// joined by newlines; a scene that takes more than max_scene_bytes is refused with the numbers.
+/// beside: FilesBeside::listed where others have submitted the job.
 Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job,
                                                                const MemoryBudget& memory,
-                                                               std::uint64_t max_scene_bytes);
+                                                               std::uint64_t max_scene_bytes,
+                                                               FilesBeside beside);
 /// The same with what is usual on this machine.
 Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job);
 
@@ -53,7 +55,7 @@ Status verify_asset(const std::vector<KnownAsset>& files, const std::string& pat
 /// time.
 class AssetShelf {
  public:
-  /// Signature of load_shared_assets().
+  /// Like load_shared_assets().
   using Loader = std::function<Result<std::shared_ptr<const SharedAssets>>(
       const JobSpec& job, const MemoryBudget& memory, std::uint64_t max_scene_bytes)>;
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "common/base/exit_codes.h"
-#include "common/protocol/keys.h"
+#include "common/protocol/access.h"
 #include "worker/run/job_cache.h"
 
 namespace baton {

@@ -105,6 +105,21 @@ void collect_settings(const ordered_json& value, const std::string& path,
   }
 }
 
+/// So that whoever checks the list has checked all that the job has opened.
+Status expect_all_assets(const ParsedJobDocument& document) {
+  const std::vector<std::string> expected = asset_paths(document.job);
+  if (std::ranges::equal(document.assets, expected, {}, &AssetDigest::path)) return {};
+  const auto [asset, path] =
+      std::ranges::mismatch(document.assets, expected, {}, &AssetDigest::path);
+  return Error{
+      ErrorKind::bad_input,
+      fmt::format("job document: $.assets: expected the {} files that the job names, in their "
+                  "order, {}",
+                  expected.size(),
+                  path == expected.end() ? fmt::format("got also {}", asset->path)
+                                         : fmt::format("{} among them", *path))};
+}
+
 }  // namespace
 
 Result<JobSpec> parse_job(std::string_view text, const std::string& name,
@@ -180,6 +195,7 @@ Result<ParsedJobDocument> parse_job_document(std::string_view text) {
         ErrorKind::bad_input,
         "job document: $.job.sampling.method: expected a method that is settled, got \"auto\""};
   }
+  BATON_TRY(expect_all_assets(document));
   document.digest = digest_of(text);
   document.picture = picture_digest(document.job, document.assets);
   return document;

@@ -62,7 +62,8 @@ Bytes copy_of(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
 /// What a buffer holds, at least as many bytes as it says. unread: its file, where that cannot be
 /// read.
 void load_buffer(const JsonView& buffer, const std::optional<ByteView>& binary,
-                 std::optional<ErrorKind>& unread, Document& document) {
+                 const std::set<std::string>* listed, std::optional<ErrorKind>& unread,
+                 Document& document) {
   // In place of what views decompress there may be nothing.
   const bool is_fallback =
       buffer.at("extensions").at("EXT_meshopt_compression").boolean("fallback");
@@ -73,6 +74,8 @@ void load_buffer(const JsonView& buffer, const std::optional<ByteView>& binary,
     if (!resource) return buffer.fail("uri: " + resource.error().message);
     if (resource->bytes) {
       bytes = std::move(*resource->bytes);
+    } else if (listed != nullptr && !listed->contains(resource->file)) {
+      return buffer.fail(not_listed(document.path, resource->file).message);
     } else {
       const Status there = expect_file(resource->file);
       Result<Bytes> file =
@@ -194,7 +197,13 @@ bool is_read(std::string_view extension) {
   return std::find(kRead.begin(), kRead.end(), extension) != kRead.end();
 }
 
-Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std::string& path) {
+Error not_listed(const std::string& path, const std::string& file) {
+  return {ErrorKind::bad_input,
+          fmt::format("{} refers to {}, which the job was not submitted with", path, file)};
+}
+
+Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std::string& path,
+                                                       const std::set<std::string>* listed) {
   BATON_ASSIGN(const Container container, open_container(bytes, path));
   BATON_ASSIGN(const nlohmann::json json,
                parse_json_text(container.json, path + ": not a glTF file"));
@@ -210,7 +219,7 @@ Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std
   const auto good = [&] { return !fault.has_value(); };
   if (good())
     root.each("buffers", [&](const JsonView& buffer) {
-      if (good()) load_buffer(buffer, container.binary, unread, *document);
+      if (good()) load_buffer(buffer, container.binary, listed, unread, *document);
     });
   // Views come before images, which come before textures.
   if (good()) parse_views(root, *document);
@@ -222,11 +231,12 @@ Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std
   return std::shared_ptr<const Document>(std::move(document));
 }
 
-Result<std::shared_ptr<const Document>> read_document(const std::string& path) {
+Result<std::shared_ptr<const Document>> read_document(const std::string& path,
+                                                      const std::set<std::string>* listed) {
   BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
   if (!stamp) return Error{ErrorKind::bad_input, path + ": missing: expected a glTF file"};
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
-  return parse_document(bytes, path);
+  return parse_document(bytes, path, listed);
 }
 
 }  // namespace baton::gltf

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -213,9 +214,15 @@ struct Document {
 /// Reads a .gltf or .glb file and the buffers beside it. Errors name file and place in its JSON:
 /// what is missing or cut, indices past their list, views past their buffer, nodes that are their
 /// own ancestors, extensions that are required and not read.
-Result<std::shared_ptr<const Document>> read_document(const std::string& path);
+/// listed: the files beside it that may be opened, another one is an error; null: any.
+Result<std::shared_ptr<const Document>> read_document(
+    const std::string& path, const std::set<std::string>* listed = nullptr);
 /// The same of bytes in memory; buffers that are files lie beside `path`.
-Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std::string& path);
+Result<std::shared_ptr<const Document>> parse_document(
+    ByteView bytes, const std::string& path, const std::set<std::string>* listed = nullptr);
+/// Why the file beside `path` is not opened: it is not one of those that the job was submitted
+/// with.
+Error not_listed(const std::string& path, const std::string& file);
 
 /// The nodes of the scene that is shown, parents first.
 std::vector<int> shown_nodes(const Document& document);

@@ -159,8 +159,11 @@ Result<Image> DetailLoader::read(const TextureSpec& spec) {
   if (index >= document->images.size())
     return document->error(
         fmt::format("expected an image below {}, got {}", document->images.size(), spec.image));
-  if (const std::string& file = document->images[index].file; !file.empty())
+  if (const std::string& file = document->images[index].file; !file.empty()) {
+    if (files_.listed() != nullptr && !files_.listed()->contains(file))
+      return gltf::not_listed(spec.file, file);
     return read_image(file);
+  }
   return read_image(document->bytes_of_image(index), name_of(spec));
 }
 

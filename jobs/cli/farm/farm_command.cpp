@@ -56,7 +56,7 @@ Result<OpenFarm> attach(const FarmCommandOptions& options) {
                  "--key is for this command and --worker-key for the pilots: a coordinator with "
                  "keys needs both"};
   }
-  BATON_TRY(client_access(options.worker_key, true));  // before the pilots find out
+  BATON_TRY(client_access(options.worker_key, true, {}));  // before the pilots find out
   return OpenFarm{LocalFarm::attach(options.coordinator),
                   {options.coordinator, options.key},
                   options.worker_key,

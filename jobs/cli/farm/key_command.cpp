@@ -18,6 +18,7 @@ Result<ExitCode> create(const KeyOptions& options) {
   BATON_TRY(create_keys(options.folder));
   fmt::print(
       "{0}/server.key   for baton-coordinator\n{0}/worker.key   for every baton-worker\n"
+      "{0}/viewer.key   for `baton`: looks only\n"
       "{0}/user.key     for `baton`: submits jobs and looks after its own\n"
       "{0}/admin.key    for `baton`: everything\n",
       options.folder);
@@ -26,8 +27,8 @@ Result<ExitCode> create(const KeyOptions& options) {
 
 Result<ExitCode> add(const KeyOptions& options) {
   BATON_TRY(add_key(options.folder, options.speaker));
-  fmt::print("{}/{}.key   {}; the coordinator lets it in when it is started again\n",
-             options.folder, options.speaker.name, role_name(options.speaker.role));
+  fmt::print("{}/{}.key   {}\n", options.folder, options.speaker.name,
+             role_name(options.speaker.role));
   return ExitCode::ok;
 }
 
@@ -39,18 +40,21 @@ void add_key_command(CLI::App& app, ExitCode& code) {
   key->require_subcommand(1);
   key->footer(
       "Examples:\n"
-      "  baton key create keys                  server.key, worker.key, user.key, admin.key\n"
+      "  baton key create keys                  server.key, and a key of each role\n"
       "  baton key add keys anna --role user    anna.key\n"
-      "A coordinator lets in the keys that its server.key lists when it starts.");
+      "A coordinator lets in the keys that its server.key lists: it reads that again when it "
+      "changes.");
   CLI::App* made =
       key->add_subcommand("create", "Keys of a coordinator, its workers and its users");
   CLI::App* added = key->add_subcommand("add", "One more key, with a name of its own");
   for (CLI::App* command : {made, added})
     command->add_option("FOLDER", options->folder, "where the keys are kept")->required();
   added->add_option("NAME", options->speaker.name, "whose key it is")->required();
-  added->add_option("--role", options->speaker.role, "worker, user or admin")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Role>{
-          {"worker", Role::worker}, {"user", Role::user}, {"admin", Role::admin}}))
+  added->add_option("--role", options->speaker.role, "worker, viewer, user or admin")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Role>{{"worker", Role::worker},
+                                                                      {"viewer", Role::viewer},
+                                                                      {"user", Role::user},
+                                                                      {"admin", Role::admin}}))
       ->option_text("ROLE=user");
   made->callback([options, &code] { code = finish(create(*options)); });
   added->callback([options, &code] { code = finish(add(*options)); });

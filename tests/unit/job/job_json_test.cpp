@@ -10,6 +10,7 @@ namespace baton {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -239,7 +240,10 @@ TEST(JobJson, RefusesKeysGivenTwiceAndDeepNesting) {
 TEST(JobJson, ADocumentIsWhole) {
   JobSpec job = parsed(job_text(""));
   job.motion.max_px = 1;
-  ParsedJobDocument document{.job = job, .assets = {}, .digest = {}, .picture = {}};
+  ParsedJobDocument document{.job = job,
+                             .assets = {{job.environment.keys.front().map, {1, 2}}},
+                             .digest = {},
+                             .picture = {}};
   const std::string text = with_sweeps(document, 2);
   EXPECT_TRUE(expect_written_document(text));
   EXPECT_FALSE(expect_written_document(text + " "));
@@ -414,6 +418,31 @@ TEST(JobDocument, CarriesTheDigestsOfAllAssets) {
   fs::remove(folder / "sky.exr");
   EXPECT_THAT(verify_assets(document->assets).error().message, HasSubstr("sky.exr: cannot open"));
   EXPECT_THAT(make_job_document(*job).error().message, HasSubstr("sky.exr: cannot open"));
+}
+
+// Who has checked the list has checked every file that the job names.
+TEST(JobDocument, TheListOfFilesIsThatOfTheJob) {
+  const fs::path folder = test_folder();
+  for (const char* const name : {"a.exr", "sky.exr"})
+    ASSERT_TRUE(write_file_atomic(folder / name, as_bytes_view("map")).ok());
+  const JobSpec job = parse_job(job_text(""), "job.json", folder).value();
+  const std::string text = make_job_document(job).value();
+  const std::string item = text.substr(
+      text.find("{\"path\""), text.find('}', text.find("{\"path\"")) + 1 - text.find("{\"path\""));
+  const auto with_list = [&](const std::string& list) {
+    std::string changed = text;
+    return parse_job_document(changed.replace(changed.find(item), item.size(), list))
+        .error()
+        .message;
+  };
+  ASSERT_TRUE(parse_job_document(text).ok());
+  const std::string sky = (folder / "sky.exr").string(), other = (folder / "a.exr").string();
+  std::string of_other = item;
+  of_other.replace(of_other.find(sky), sky.size(), other);
+  const std::string expected = "job document: $.assets: expected the 1 files that the job names";
+  EXPECT_THAT(with_list(""), AllOf(HasSubstr(expected), HasSubstr(sky + " among them")));
+  EXPECT_THAT(with_list(of_other), AllOf(HasSubstr(expected), HasSubstr(sky + " among them")));
+  EXPECT_THAT(with_list(item + "," + item), HasSubstr("got also " + sky));
 }
 
 TEST(JobDocument, RefusesADocumentThatIsDamaged) {

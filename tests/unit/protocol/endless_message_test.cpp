@@ -3,8 +3,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "common/base/limits.h"
 #include "common/protocol/router.h"
@@ -81,6 +84,84 @@ TEST(EndlessMessage, ItsConnectionIsClosedAndOthersGoOn) {
   EXPECT_FALSE(router.take_refusal().has_value());
 }
 
+// Whoever has no key, or says nothing, does not take the descriptors of those who work.
+TEST(SilentConnections, OfOneAddressOnlySoManyStay) {
+  Router router = Router::bind("tcp://127.0.0.1:*").value();
+  const std::string& endpoint = router.endpoint();
+  WorkerChannel channel = WorkerChannel::connect(endpoint).value();
+  ASSERT_TRUE(channel.send(LeaseRequest{1}));
+  constexpr int kCount = 3 * limits::kMaxSilentConnections;
+  std::vector<int> mute;
+  for (int i = 0; i < kCount; ++i) {
+    mute.push_back(connect_to_loopback(std::stoi(endpoint.substr(endpoint.rfind(':') + 1))));
+    ASSERT_GE(mute.back(), 0);
+  }
+  // The others are closed long before the time of a handshake is up.
+  const auto num_open = [&] {
+    return std::ranges::count_if(mute, [](int descriptor) {
+      char byte = 0;
+      while (true) {
+        const ssize_t read = ::recv(descriptor, &byte, 1, MSG_DONTWAIT);
+        if (read <= 0) return read < 0 && errno == EAGAIN;
+      }
+    });
+  };
+  int num_heard = 0;
+  std::optional<Error> refusal;
+  const auto deadline = std::chrono::steady_clock::now() + with_patience(8s);
+  while (num_open() > limits::kMaxSilentConnections &&
+         std::chrono::steady_clock::now() < deadline) {
+    num_heard += router.receive(20ms).has_value();
+    if (auto said = router.take_refusal()) refusal = said;
+  }
+  EXPECT_EQ(num_open(), limits::kMaxSilentConnections);
+  ASSERT_TRUE(refusal.has_value());
+  EXPECT_THAT(refusal->message, HasSubstr("of one address that say nothing"));
+  ASSERT_TRUE(channel.send(LeaseRequest{2}));
+  while (num_heard < 2 && std::chrono::steady_clock::now() < deadline)
+    num_heard += router.receive(20ms).has_value();
+  EXPECT_EQ(num_heard, 2) << "who has spoken stays";
+  for (const int descriptor : mute) ::close(descriptor);
+}
+
+// Answers that nobody reads take no more memory than one of the largest.
+TEST(UnreadAnswers, AreLimitedInBytes) {
+  Router router = Router::bind("tcp://127.0.0.1:*").value();
+  const std::string& endpoint = router.endpoint();
+  const int talker = connect_to_loopback(std::stoi(endpoint.substr(endpoint.rfind(':') + 1)));
+  ASSERT_GE(talker, 0);
+  const auto deadline = std::chrono::steady_clock::now() + with_patience(30s);
+  const auto say = [&](const std::string& words) {
+    EXPECT_EQ(::send(talker, words.data(), words.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(words.size()));
+  };
+  // The library takes what comes after a greeting once it has answered that.
+  say(greeting());
+  std::string heard;
+  for (char byte = 0; !heard.ends_with("READY") && ::recv(talker, &byte, 1, 0) == 1;) heard += byte;
+  say(ready() + std::string("\0\1x", 3));
+  std::optional<Incoming> question;
+  while (!question && std::chrono::steady_clock::now() < deadline) question = router.receive(20ms);
+  ASSERT_TRUE(question.has_value());
+  constexpr std::size_t kAnswerBytes = 4 << 20;
+  const JobDocument answer{{}, std::string(kAnswerBytes, 'x'), {}, {}};
+  int num_taken = 0;
+  for (int i = 0; i < 100; ++i) num_taken += router.send(question->peer, answer);
+  EXPECT_GE(num_taken, 2);
+  EXPECT_LE(num_taken * kAnswerBytes, limits::kMaxUnreadBytes);
+
+  // Once it reads it gets answers again.
+  std::string read(1 << 20, '\0');
+  bool is_heard = false;
+  while (!is_heard && std::chrono::steady_clock::now() < deadline) {
+    while (::recv(talker, read.data(), read.size(), MSG_DONTWAIT) > 0) continue;
+    router.receive(5ms);
+    is_heard = router.send(question->peer, answer);
+  }
+  EXPECT_TRUE(is_heard);
+  ::close(talker);
+}
+
 /// With a key, as farms have it, or without.
 class ManyMessages : public testing::TestWithParam<bool> {};
 
@@ -91,8 +172,8 @@ TEST_P(ManyMessages, MayComeOverOneConnection) {
   if (GetParam()) {
     const fs::path folder = fs::path(testing::TempDir()) / ("many-" + std::to_string(::getpid()));
     ASSERT_TRUE(create_keys(folder));
-    server = server_access((folder / "server.key").string(), false).value();
-    client = client_access((folder / "worker.key").string(), false).value();
+    server = server_access((folder / "server.key").string(), false, {}, {}).value();
+    client = client_access((folder / "worker.key").string(), false, {}).value();
     fs::remove_all(folder);
   }
   Router router = Router::bind("tcp://127.0.0.1:*", server).value();

@@ -36,15 +36,15 @@ struct KeysTest : testing::Test {
   void TearDown() override { fs::remove_all(folder); }
 
   ClientAccess client(const std::string& name) const {
-    return client_access((folder / (name + ".key")).string(), false).value();
+    return client_access((folder / (name + ".key")).string(), false, {}).value();
   }
   ServerAccess server() const {
-    return server_access((folder / "server.key").string(), false).value();
+    return server_access((folder / "server.key").string(), false, {}, {}).value();
   }
 };
 
 TEST_F(KeysTest, KeysAreTheirOwnersAlone) {
-  for (const char* name : {"server", "worker", "user", "admin"}) {
+  for (const char* name : {"server", "worker", "viewer", "user", "admin"}) {
     const fs::path path = folder / (std::string(name) + ".key");
     struct stat status {};
     ASSERT_EQ(::stat(path.c_str(), &status), 0);
@@ -59,8 +59,8 @@ TEST_F(KeysTest, KeysAreTheirOwnersAlone) {
 TEST_F(KeysTest, EachKeyIsKnownByRoleAndName) {
   ASSERT_TRUE(add_key(folder, {Role::user, "anna"}).ok());
   const ServerKey key = read_server_key(folder / "server.key").value();
-  EXPECT_EQ(key.known.size(), 4u);
-  for (const char* name : {"worker", "user", "admin", "anna"}) {
+  EXPECT_EQ(key.known.size(), 5u);
+  for (const char* name : {"worker", "viewer", "user", "admin", "anna"}) {
     const ClientKey of_client = read_client_key(folder / (std::string(name) + ".key")).value();
     ASSERT_TRUE(key.known.contains(of_client.own.public_key)) << name;
     EXPECT_EQ(key.known.at(of_client.own.public_key).name, name);
@@ -149,7 +149,7 @@ TEST_F(KeysTest, AKeyOfAnotherCoordinatorAndNoKeyAreRefused) {
   Router router = Router::bind("tcp://127.0.0.1:*", server()).value();
   ASSERT_TRUE(create_keys(folder / "other").ok());
   const std::string other = (folder / "other/admin.key").string();
-  for (const ClientAccess& access : {client_access(other, false).value(), ClientAccess{}}) {
+  for (const ClientAccess& access : {client_access(other, false, {}).value(), ClientAccess{}}) {
     const auto [ours, theirs] = try_to_speak(router, access);
     ASSERT_TRUE(ours && theirs);
     EXPECT_THAT(ours->message, HasSubstr("was broken off: either side may lack a key"));

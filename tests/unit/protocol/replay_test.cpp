@@ -89,8 +89,8 @@ std::optional<Incoming> read_next(Router& router, std::chrono::milliseconds pati
 TEST(Replay, AMessageThatComesAgainIsRefusedAndLogged) {
   const fs::path folder = fs::path(testing::TempDir()) / ("replay-" + std::to_string(::getpid()));
   ASSERT_TRUE(create_keys(folder));
-  const auto server = server_access((folder / "server.key").string(), false).value();
-  const auto access = client_access((folder / "worker.key").string(), false).value();
+  const auto server = server_access((folder / "server.key").string(), false, {}, {}).value();
+  const auto access = client_access((folder / "worker.key").string(), false, {}).value();
   fs::remove_all(folder);
   Router router = Router::bind("tcp://127.0.0.1:*", server).value();
   const std::string& endpoint = router.endpoint();

@@ -76,7 +76,7 @@ TEST_F(ExecuteTest, ASceneThatIsWrongIsLoadedOnce) {
   AssetShelf shelf([&](const JobSpec& job, const MemoryBudget& memory,
                        std::uint64_t most) -> Result<std::shared_ptr<const SharedAssets>> {
     if (++loads == 1) return Error{kind, "tetrahedron.off: it is wrong"};
-    return load_shared_assets(job, memory, most);
+    return load_shared_assets(job, memory, most, FilesBeside::listed);
   });
   const auto load = [&] {
     using namespace std::chrono_literals;

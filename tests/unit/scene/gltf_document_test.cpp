@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 
+#include "common/scene/gltf/document.h"
 #include "common/scene/mesh_loader.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/mesh_files.h"
@@ -202,6 +205,25 @@ TEST(GltfDocument, ContainersAndBuffersAreChecked) {
   EXPECT_THAT(text(R"(,"extensionsRequired":["KHR_texture_transform","EXT_a","EXT_b"])"),
               HasSubstr("$.extensionsRequired: the file cannot be shown without what is not read: "
                         "EXT_a, EXT_b"));
+}
+
+// Whoever submits a job lists its files; a worker opens no other, whatever a file of it says.
+TEST(GltfDocument, FilesThatAreNotListedAreNotOpened) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "listed";
+  std::filesystem::create_directories(folder / "scene");
+  std::ofstream(folder / "secret") << "the secret";
+  std::ofstream(folder / "scene/a.gltf")
+      << R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":9,"uri":"../secret"}]})";
+  const std::string scene = (folder / "scene/a.gltf").string();
+  const std::set<std::string> none, listed{(folder / "secret").string()};
+  EXPECT_TRUE(gltf::read_document(scene).ok()) << "whoever submits it";
+  EXPECT_TRUE(gltf::read_document(scene, &listed).ok());
+  const auto refused = gltf::read_document(scene, &none);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message, HasSubstr("which the job was not submitted with"));
+  EXPECT_THAT(load_mesh(scene, false, false, &none).error().message,
+              HasSubstr("which the job was not submitted with"));
+  std::filesystem::remove_all(folder);
 }
 
 /// A file of several kilobytes.

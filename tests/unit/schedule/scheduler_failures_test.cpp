@@ -414,5 +414,26 @@ TEST(SchedulerFailures, AGrantSaysHowLongTasksTake) {
   EXPECT_EQ(farm.scheduler.longest_task_seconds(), 20);
 }
 
+// One worker's key is trusted with pixels, not with the end of a job.
+TEST_F(SchedulerTest, WhatWasNeverGrantedIsNobodysFailure) {
+  const GrantLease granted = farm.ask_one("a");
+  const LeaseId& lease = granted.lease;
+  const LeaseId others{lease.job, render(0, 1), 1, lease.epoch};  // nobody has it
+  for (std::uint32_t attempt = 0; attempt < 20; ++attempt) {
+    for (const std::uint32_t epoch : {0u, 1u, 2u}) {
+      LeaseId claimed = others;
+      claimed.attempt = attempt;
+      claimed.epoch = epoch;
+      farm.step(WorkerAlive{"b", {claimed}});
+      farm.step(AttemptFailed{{claimed, "b", "boom"}});
+    }
+  }
+  EXPECT_EQ(farm.status(), JobStatus::running);
+  EXPECT_FALSE(farm.scheduler.find_job(farm.job)->tasks.attempts().has_failed());
+  // What it says of a lease that another one has is nothing either.
+  farm.step(AttemptFailed{{lease, "b", "boom"}});
+  EXPECT_EQ(all_of<RecordCompletion>(farm.finish(granted)).size(), 1u);
+}
+
 }  // namespace
 }  // namespace baton
