@@ -7,6 +7,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
+#include "common/base/file_stamp.h"
 #include "common/base/result.h"
 #include "common/job/activity.h"
 #include "common/job/farm_event.h"
@@ -20,7 +21,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 16;
+inline constexpr std::uint16_t kProtocolVersion = 17;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.
@@ -45,6 +46,8 @@ struct Heartbeat {
 struct TaskDone {
   LeaseId lease;
   TaskOutput made;
+  /// How the file of an assembled frame stood when it was written; zero: that is not known.
+  FileStamp frame = {};
   /// About the job's files, for people; a worker sends each once.
   std::vector<std::string> notes = {};
 };

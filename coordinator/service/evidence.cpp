@@ -96,6 +96,7 @@ std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const Tas
   frame.stamp = stamp_of(frame.path);
   if (frame.stamp && *frame.stamp && (*frame.stamp)->size_bytes != image.size_bytes)
     frame.stamp = std::optional<FileStamp>();
+  frame.is_as_written = frame.stamp && *frame.stamp && **frame.stamp == report.frame;
   return frame;
 }
 

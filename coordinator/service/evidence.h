@@ -20,6 +20,8 @@ struct ReportedFrame {
   std::filesystem::path path;
   Digest digest;                           ///< as reported
   Result<std::optional<FileStamp>> stamp;  ///< nullopt: not there, or with another size
+  /// As the worker saw it when it had these bytes.
+  bool is_as_written = false;
 };
 /// nullopt: no such frame is reported.
 std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const TaskDone& report);

@@ -115,15 +115,7 @@ Result<JobDetail> FarmCore::living_detail(const Digest& job) {
 }
 
 Result<std::optional<JobDetail>> FarmCore::archived_detail(const Digest& job) {
-  BATON_ASSIGN(const std::optional<Bytes> bytes, journal.archived_detail(job));
-  if (!bytes) return std::optional<JobDetail>();
-  JobDetail detail;
-  ArchiveReader reader(*bytes);
-  reader(detail);
-  if (!reader.complete())
-    return Error{ErrorKind::corrupt,
-                 fmt::format("the archived job {} cannot be read", history.name_of(job))};
-  return std::optional(std::move(detail));
+  return baton::archived_detail(journal, job, history.name_of(job));
 }
 
 Result<bool> FarmCore::ended_by_frames(const Digest& job, const std::string& reason,

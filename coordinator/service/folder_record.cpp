@@ -10,6 +10,7 @@
 #include "common/job/text/job_json.h"
 #include "common/store/frame_locks.h"
 #include "coordinator/service/farm_document.h"
+#include "coordinator/service/job_report.h"
 
 namespace baton {
 
@@ -20,8 +21,9 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
                                         const JobId& id) {
   FolderRecord record;
   record.version_ = version;
+  record.family_ = jobs.versions(id);
   BATON_ASSIGN(record.jobs_[version].renderers, journal.renderers(version));
-  if (auto locks = patiently([&] { return locks_of_others(folder, id.hex()); }))
+  if (auto locks = patiently([&] { return locks_of_others(folder, {}); }))
     record.locked_ = std::move(*locks);
   BATON_ASSIGN(const auto given_up, journal.given_up(id));
   for (const auto& [file, picture] : given_up) record.given_up_[fs::path(folder) / file] = picture;
@@ -38,31 +40,48 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
       if (frame.index() < document->job.frames.size())
         writer.granted.insert(frame_path(document->job, frame));
     }
+    // What another job had when it ended, less what it has lost since.
+    std::optional<JobDetail> ended;
+    if (jobs.of(other).id != id) {
+      BATON_ASSIGN(ended, archived_detail(journal, other, other.short_hex()));
+    }
     BATON_TRY(journal.for_each_completion(other, [&](const Completion& done) -> Status {
       if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
-      const fs::path path = frame_path(document->job, done.task.frame());
-      record.images_[path].push_back({other, done.made.outputs.front()});
+      const FrameIndex frame = done.task.frame();
+      if (frame.index() >= document->job.frames.size()) return {};
+      const bool is_given_away =
+          ended && std::ranges::find(ended->frames_done, document->job.frames[frame.index()]) ==
+                       ended->frames_done.end();
+      record.images_[frame_path(document->job, frame)].push_back(
+          {other, done.made.outputs.front(), is_given_away});
       return {};
     }));
   }
-  record.mark_superseded(jobs.versions(id), version);
+  record.mark_superseded();
   return record;
 }
 
-void FolderRecord::mark_superseded(const std::vector<Digest>& versions, const Digest& version) {
+void FolderRecord::mark_superseded() {
   const auto age = [&](const Image& image) {
-    return std::ranges::find(versions, image.job) - versions.begin();
+    return std::ranges::find(family_, image.job) - family_.begin();
   };
   const auto is_of_job = [&](const Image& image) {
-    return age(image) < std::ssize(versions) && !image.image.is_placeholder();
+    return age(image) < std::ssize(family_) && !image.image.is_placeholder();
   };
   for (auto& [path, images] : images_) {
     std::ptrdiff_t newest = -1;
     for (const Image& image : images) {
       if (is_of_job(image)) newest = std::max(newest, age(image));
     }
-    for (Image& image : images)
-      image.is_superseded = is_of_job(image) && age(image) < newest && image.job != version;
+    // One that was given away stays what it is until there is another in its place.
+    const bool has_owner = std::ranges::any_of(images, [](const Image& image) {
+      return !image.is_given_away && !image.image.is_placeholder();
+    });
+    for (Image& image : images) {
+      image.is_superseded =
+          image.job != version_ &&
+          (is_of_job(image) ? age(image) < newest : image.is_given_away && has_owner);
+    }
   }
 }
 
@@ -97,7 +116,16 @@ bool FolderRecord::may_be_unreported(const fs::path& path, const FileVerdict& pi
   const bool is_reported =
       images != images_.end() &&
       std::ranges::find(images->second, job, &Image::job) != images->second.end();
-  return is_by_us && !is_reported && (job == version_ || writer->second.granted.contains(path));
+  const bool is_of_job = std::ranges::find(family_, job) != family_.end();
+  return is_by_us && !is_reported &&
+         (job == version_ || (is_of_job && writer->second.granted.contains(path)));
+}
+
+std::optional<Digest> FolderRecord::writer_of(const FileVerdict& picture) const {
+  for (const auto& [job, known] : jobs_) {
+    if (picture.writer.starts_with(job.hex())) return job;
+  }
+  return std::nullopt;
 }
 
 bool FolderRecord::is_foreign(const FileVerdict& picture) const {
@@ -153,8 +181,8 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
       odd.unreadable = verdict.fault;
     } else if (verdict.state == FileState::strange &&
                !(restart ? record.is_recorded(path, verdict) : record.may_replace(path, verdict))) {
-      odd.doubt.strange.push_back(
-          {path.string(), number, verdict.digest, record.is_foreign(verdict)});
+      odd.doubt.strange.push_back({path.string(), number, verdict.digest,
+                                   record.is_foreign(verdict), record.writer_of(verdict)});
     }
   }
   return odd;

@@ -19,7 +19,8 @@ namespace baton {
 
 /// What the journal has of the frames in a job's folder, by whichever job wrote them there. Paths
 /// are those of the job (frame_path()). Where several versions of one job have written a frame, it
-/// is the newest's: who puts an older one's back has replaced it.
+/// is the newest's, and of several jobs that of the one that has not lost it to another: who puts a
+/// former one's back has replaced it.
 class FolderRecord {
  public:
   /// version: the digest of the job's document, which the journal may not have yet; what it has
@@ -32,9 +33,9 @@ class FolderRecord {
   std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
   /// Whether a picture in the place of a frame may be replaced: a person has given it up, or it is
   /// a job's of this folder, one that is recorded, or one that was written and never reported: of
-  /// the version itself, which will make it again, or where a worker was granted it; by what the
-  /// job is rendered with here, or else it is another coordinator's. None that another job has
-  /// locked (common/store/frame_locks.h), none while that cannot be read.
+  /// the version itself, which will make it again, or of another one of the job where a worker was
+  /// granted it; by what the job is rendered with here, or else it is another coordinator's. None
+  /// that is locked (common/store/frame_locks.h), none while that cannot be read.
   bool may_replace(const std::filesystem::path& path, const FileVerdict& picture) const {
     return is_recorded(path, picture) || may_be_unreported(path, picture);
   }
@@ -42,6 +43,8 @@ class FolderRecord {
   bool is_recorded(const std::filesystem::path& path, const FileVerdict& picture) const;
   /// Whether a picture is as a job wrote it that is none of this folder's.
   bool is_foreign(const FileVerdict& picture) const;
+  /// The job of this folder that a picture names; nullopt: none.
+  std::optional<Digest> writer_of(const FileVerdict& picture) const;
   /// Those of which only the digest must be known for that: at most kMostTold, the newest of them.
   std::vector<Digest> replaceable(const std::filesystem::path& path) const;
   void give_up(const std::filesystem::path& path, const Digest& picture);
@@ -50,14 +53,16 @@ class FolderRecord {
   struct Image {
     Digest job;
     BlobRef image;
-    /// A newer version of the job has written its own there.
+    /// Another job, whose picture it was to be, has it not any more.
+    bool is_given_away = false;
+    /// Somebody else has written a picture there since.
     bool is_superseded = false;
   };
   bool is_locked(const std::filesystem::path& path) const {
     return !locked_ || locked_->contains(path.filename().string());
   }
 
-  void mark_superseded(const std::vector<Digest>& versions, const Digest& version);
+  void mark_superseded();
   bool may_be_unreported(const std::filesystem::path& path, const FileVerdict& picture) const;
 
   static constexpr std::size_t kMostTold = 256;
@@ -70,7 +75,8 @@ class FolderRecord {
     std::set<std::filesystem::path> granted;  ///< frames that its workers may have written
   };
   std::map<Digest, Writer> jobs_;
-  Digest version_;  ///< the one that was asked for
+  Digest version_;              ///< the one that was asked for
+  std::vector<Digest> family_;  ///< all versions of its job
 };
 
 /// Frames of which only a person can say what becomes of them.
@@ -78,8 +84,9 @@ struct FramesInDoubt {
   struct Frame {
     std::string file;
     FrameNumber number{};
-    Digest digest = {};       ///< of a strange one
-    bool is_foreign = false;  ///< as a job wrote it that is not known here
+    Digest digest = {};                 ///< of a strange one
+    bool is_foreign = false;            ///< as a job wrote it that is not known here
+    std::optional<Digest> writer = {};  ///< the known job that wrote it
   };
   std::vector<Frame> strange;        ///< files that are pictures of nobody here
   std::vector<Frame> locked_absent;  ///< locked, and not there

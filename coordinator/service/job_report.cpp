@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 
+#include "common/base/archive.h"
 #include "coordinator/schedule/held_states.h"
 #include "coordinator/schedule/reasons.h"
 #include "coordinator/service/history.h"
@@ -169,6 +171,17 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const Fil
   if (!restart && lost.num_frames > 0 && !fs::is_directory(folder, error))
     lost.unreadable = fmt::format("{}: the output folder is not there", folder.string());
   return lost;
+}
+
+Result<std::optional<JobDetail>> archived_detail(Journal& journal, const Digest& job,
+                                                 const std::string& name) {
+  BATON_ASSIGN(const std::optional<Bytes> bytes, journal.archived_detail(job));
+  if (!bytes) return std::optional<JobDetail>();
+  JobDetail detail;
+  ArchiveReader reader(*bytes);
+  reader(detail);
+  if (reader.complete()) return std::optional(std::move(detail));
+  return Error{ErrorKind::corrupt, fmt::format("the archived job {} cannot be read", name)};
 }
 
 }  // namespace baton

@@ -19,6 +19,11 @@ JobSummary summarize(const Digest& digest, const Scheduler::Job& job);
 JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
                        const std::vector<Failure>& failures);
 
+/// What people are told of a job in the archive; nullopt: it is not there. name: for the error
+/// (corrupt).
+Result<std::optional<JobDetail>> archived_detail(Journal& journal, const Digest& job,
+                                                 const std::string& name);
+
 /// Which of the jobs that were found for a text is meant: the one of this ID, or of this name, or
 /// whose ID begins so; where several are, the only one that has not ended. Returns its newest
 /// version. Errors: none, or several, whose IDs it lists.

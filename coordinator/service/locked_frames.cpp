@@ -194,15 +194,18 @@ Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frame
 }
 
 Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id) {
-  const auto locks = patiently([&] { return locks_of_others(spec.output.directory, id.hex()); });
+  const auto locks = patiently([&] { return locks_of_others(spec.output.directory, {}); });
   if (!locks) return Error{ErrorKind::io, locks.error().message};
-  std::vector<FrameNumber> strange;
+  const std::set<FrameNumber> own = jobs.locks(id).frames;
+  std::vector<FrameNumber> strange, renumbered;
   std::map<JobId, std::vector<FrameNumber>> known;
   for (const FrameNumber frame : spec.frames) {
     const auto lock = locks->find(frame_file_name(spec.output.pattern, frame.value()));
     if (lock == locks->end()) continue;
     const std::optional<JobId> other = JobId::from_hex(lock->second);
-    if (!other || jobs.versions(*other).empty()) {
+    if (other == id) {
+      if (!own.contains(frame)) renumbered.push_back(frame);
+    } else if (!other || jobs.versions(*other).empty()) {
       strange.push_back(frame);
     } else {  // under another name that the folder had
       known[*other].push_back(frame);
@@ -211,6 +214,16 @@ Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, co
   if (!known.empty())
     return locked_elsewhere(spec, known.begin()->second, known.begin()->first.short_hex(),
                             jobs.locked(known.begin()->first));
+  if (!renumbered.empty()) {
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format(
+            "job '{}': frames {} would write files in {} that are locked under other "
+            "numbers, and stay: `baton job lock {} --off --frames {}` unlocks them, another "
+            "output.pattern or output.directory keeps them",
+            spec.name, format_frames(renumbered), spec.output.directory, id.short_hex(),
+            format_frames(jobs.locked(id)))};
+  }
   if (strange.empty()) return {};
   return Error{
       ErrorKind::bad_input,

@@ -66,8 +66,8 @@ Result<std::map<JobId, std::vector<FrameNumber>>> settle_locks(Journal& journal,
 /// short, of that job. there: how they are numbered in it, where names of files meet.
 Error locked_elsewhere(const JobSpec& job, const std::vector<FrameNumber>& frames,
                        const std::string& other_name, const std::vector<FrameNumber>& there);
-/// By what stands in the folder. Errors: bad_input, another job has locked frames of this one; io,
-/// it cannot be read.
+/// By what stands in the folder. Errors: bad_input, another job has locked frames of this one, or
+/// this one has under other numbers; io, it cannot be read.
 Status expect_no_strange_locks(const JobSpec& spec, const IdentityBook& jobs, const JobId& id);
 /// Error (bad_input): some of these frames are not among those that are locked in the job.
 Status expect_locked(const JobId& job, const std::vector<FrameNumber>& locked,

@@ -266,11 +266,13 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
   // that is not where it belongs is on a disk that only the worker sees, or in another folder.
   if (is_elsewhere) return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
   if (!is_frame_there) {
-    const std::string why =
-        frame->stamp ? frame->path.string() + ": reported, but not there as the coordinator sees it"
-                     : frame->stamp.error().message;
-    return farm_.step(AttemptFailed{
-        {message.lease, worker, why + ": is the output folder mounted where the worker runs?"}});
+    // Nobody's failure; that of a folder that only the worker sees pauses the job after some times.
+    spdlog::warn("worker {}: {}; it is made again", worker,
+                 frame->stamp ? frame->path.string() +
+                                    ": reported, but gone, cut or another since, or not "
+                                    "where the coordinator sees it"
+                              : frame->stamp.error().message);
+    return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
   }
   if (missing) {
     spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,

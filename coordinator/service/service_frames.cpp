@@ -36,15 +36,22 @@ Status Service::judge_place(const std::string& worker, const LeaseReturn& messag
 }
 
 /// Remembers how the frame of an accepted report stands: as long as it stands so, it needs no
-/// reading.
+/// reading. One that has changed since it was written is read before the job is done.
 Status Service::keep_frame_file(const TaskDone& report, const ReportedFrame& frame) {
   const Scheduler::Job* const job = farm_.scheduler.find_job(report.lease.job);
   const auto task = job ? job->tasks.graph().find(report.lease.task) : std::nullopt;
   if (!task || job->tasks.made().outputs(*task) != report.made.outputs) return {};
-  const FileStamp stamp = frame.stamp.value().value();
-  files_.add({frame.path, stamp, frame.digest, {}, report.lease.job.hex()});
-  BATON_TRY(farm_.journal.record_given_up(farm_.history.jobs().of(report.lease.job).id,
-                                          frame.path.filename().string(), std::nullopt));
+  const FileStamp stamp = frame.is_as_written ? report.frame : FileStamp();
+  if (frame.is_as_written) {
+    files_.add({frame.path, stamp, frame.digest, {}, report.lease.job.hex()});
+  } else {
+    files_.forget(frame.path);
+  }
+  const JobId id = farm_.history.jobs().of(report.lease.job).id;
+  const std::string name = frame.path.filename().string();
+  BATON_ASSIGN(const auto given_up, farm_.journal.given_up(id));
+  if (given_up.contains(name))
+    BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return file == name; }));
   return farm_.journal.record_frame_file(report.lease.job, report.lease.task.frame(),
                                          FrameFile{frame.digest, stamp});
 }

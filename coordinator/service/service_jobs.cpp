@@ -227,6 +227,12 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   BATON_ASSIGN(const std::optional<OddFrames> odd,
                await_frames(peer, message, {document->digest, id}, document->job, locked));
   if (!odd) return {};
+  for (const FramesInDoubt::Frame& frame : odd->doubt.strange) {
+    const Status own = frame.writer ? farm_.check_own(speaker_, *frame.writer) : Status();
+    if (!own)
+      return farm_.refuse(
+          peer, {own.error().kind, fmt::format("{}: {}", frame.file, own.error().message)});
+  }
   const Scheduler::Job* const known = farm_.scheduler.find_job(document->digest);
   const bool runs = known != nullptr && known->status == JobStatus::running;
   const std::string fault = fault_text(*odd, id);
@@ -382,7 +388,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   if (ends_again && fault.empty())
     BATON_TRY(
         Submission(farm_, files_, speaker_).submit(PeerId(), *document, {*text, false, true}, {}));
-  return answer_detail(peer, *job);
+  return answer_detail(peer, farm_.history.jobs().versions(id).back());
 }
 
 /// The scheduler's order changes, and no document.

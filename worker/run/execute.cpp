@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/base/file_stamp.h"
 #include "common/base/patiently.h"
 #include "common/image/film_tile.h"
 #include "common/job/motion.h"
@@ -278,8 +279,8 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
   std::optional<PictureInPlace> other;
   const auto may_replace = [&](const Digest& made) -> Result<bool> {
     const std::filesystem::path path = frame_path(loaded.job, frame);
-    Result<FramePlace> place = patiently(
-        [&] { return look_at_place(path, made, grant.may_replace, loaded.id); }, store.stop());
+    Result<FramePlace> place =
+        patiently([&] { return look_at_place(path, made, grant.may_replace); }, store.stop());
     if (!place) return Error{ErrorKind::timeout, place.error().message};
     other = std::move(place->stays);
     if (other)
@@ -296,8 +297,11 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
     return unseen;
   }
   if (!written) return written.error();
+  // As it stands now it is what was read back.
+  const auto stamp = stamp_of(frame_path(loaded.job, frame));
   return TaskResult{.made = {.outputs = {written->file},
                              .frames = {{frame.value(), task.tile, {}, written->quality}}},
+                    .frame = stamp && *stamp ? **stamp : FileStamp(),
                     .notes = std::move(notes)};
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/file_stamp.h"
 #include "common/base/result.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/task.h"
@@ -18,6 +19,8 @@ namespace baton {
 /// What a finished task hands back.
 struct TaskResult {
   TaskOutput made;
+  /// How the file of an assembled frame stood when it was written; zero: that is not known.
+  FileStamp frame = {};
   /// What this machine does not see of the job, a line; then nothing was done.
   std::string unseen = {};
   /// Held inputs that are not here; then nothing was done.

@@ -12,7 +12,7 @@
 namespace baton {
 
 Result<FramePlace> look_at_place(const std::filesystem::path& frame, const Digest& made,
-                                 const std::vector<Digest>& may_replace, const JobId& job) {
+                                 const std::vector<Digest>& may_replace) {
   // Whatever an error is of, it may have gone in a moment.
   const auto of_the_moment = [](const Error& error) { return Error{ErrorKind::io, error.message}; };
   const Result<std::optional<FileStamp>> stamp = stamp_of(frame);
@@ -22,7 +22,7 @@ Result<FramePlace> look_at_place(const std::filesystem::path& frame, const Diges
   if (!bytes) return of_the_moment(bytes.error());
   const Digest there = digest_of(*bytes);
   if (there == made) return FramePlace{};
-  const auto locks = locks_of_others(frame.parent_path(), job.hex());
+  const auto locks = locks_of_others(frame.parent_path(), {});
   if (!locks) return of_the_moment(locks.error());
   if (locks->contains(frame.filename().string()))
     return FramePlace{.stays = PictureInPlace{there, {}}};

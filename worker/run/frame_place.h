@@ -7,7 +7,6 @@
 
 #include "common/base/digest.h"
 #include "common/base/result.h"
-#include "common/job/job_id.h"
 
 namespace baton {
 
@@ -26,10 +25,11 @@ struct FramePlace {
   std::optional<PictureInPlace> stays = {};
 };
 
-/// made: the digest of the frame's bytes. may_replace: of pictures that may go. A picture that a
-/// job other than `job` has locked stays, whatever it is (common/store/frame_locks.h). Errors, io:
-/// what is there, or the locks, cannot be read now.
+/// made: the digest of the frame's bytes. may_replace: of pictures that may go. A picture that any
+/// job has locked stays, whatever it is (common/store/frame_locks.h): a worker is not asked to
+/// write what its own job has locked, as far as its coordinator knows. Errors, io: what is there,
+/// or the locks, cannot be read now.
 Result<FramePlace> look_at_place(const std::filesystem::path& frame, const Digest& made,
-                                 const std::vector<Digest>& may_replace, const JobId& job);
+                                 const std::vector<Digest>& may_replace);
 
 }  // namespace baton

@@ -89,7 +89,8 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
                                 picture.digest, picture.writer}});
   } else if (event.result) {
     reports_.push_back(
-        {event.lease, TaskDone{event.lease, event.result->made, event.result->notes}, now});
+        {event.lease,
+         TaskDone{event.lease, event.result->made, event.result->frame, event.result->notes}, now});
     send_report(reports_.back(), now, actions);
   } else if (event.result.error().kind != ErrorKind::cancelled) {
     const Error& error = event.result.error();

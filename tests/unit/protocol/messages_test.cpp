@@ -61,7 +61,7 @@ const std::vector<Message>& examples() {
       WorkerHello{"w", "h\xc3\xb6st", 77, 1, 2, "baton 1", "AVX2", {kLease, kLease}},
       LeaseRequest{7},
       Heartbeat{{kLease}},
-      TaskDone{kLease, {{kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}}, {"odd", ""}},
+      TaskDone{kLease, {{kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}}, {5, 6, 7}, {"odd", ""}},
       TaskFailed{kLease, "no", true, true},
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
@@ -151,13 +151,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 16);
+  static_assert(kProtocolVersion == 17);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "b9244362512f7d2c0175e4460c6159a8");
+  EXPECT_EQ(digest_of(all).hex(), "695fe08ee0fbc5d559068fa08b56a36f");
 }
 
 // Names are one line, what is told may be several; documents and paths are bytes.
@@ -173,7 +173,7 @@ TEST(Messages, TextsAreLegible) {
   EXPECT_EQ(sent(hello).host, line);
   EXPECT_EQ(sent(ShowJob{odd}).job, line);
   EXPECT_EQ(sent(TaskFailed{{}, odd}).message, text);
-  EXPECT_EQ(sent(TaskDone{{}, {}, {odd}}).notes.at(0), text);
+  EXPECT_EQ(sent(TaskDone{{}, {}, {}, {odd}}).notes.at(0), text);
   EXPECT_EQ(sent(Refused{1, odd}).message, text);
   EXPECT_EQ(sent(EventList{{{.worker = odd}}}).events.at(0).worker, text);
   EXPECT_EQ(sent(SubmitJob{odd}).json, odd);

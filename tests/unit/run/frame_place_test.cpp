@@ -6,6 +6,7 @@
 #include "common/image/film_tile.h"
 #include "common/image/frame_seal.h"
 #include "common/image/image_io.h"
+#include "common/job/job_id.h"
 #include "common/store/frame_locks.h"
 
 namespace baton {
@@ -34,21 +35,21 @@ struct FramePlaceTest : testing::Test {
     return digest_of(read_file(frame, 1 << 20).value());
   }
   std::optional<PictureInPlace> find(const std::vector<Digest>& may_replace = {}) const {
-    return look_at_place(frame, made, may_replace, kJob).value().stays;
+    return look_at_place(frame, made, may_replace).value().stays;
   }
 };
 
 TEST_F(FramePlaceTest, OnlyAWholePictureOfOthersStays) {
   EXPECT_FALSE(find()) << "nothing is there";
-  EXPECT_TRUE(look_at_place(frame, made, {}, kJob).value().is_free);
+  EXPECT_TRUE(look_at_place(frame, made, {}).value().is_free);
   const Digest there = put_picture(0.5f, "0123");
   ASSERT_TRUE(find());
   EXPECT_EQ(find()->digest, there);
   EXPECT_EQ(find()->writer, "0123");
   EXPECT_TRUE(find({digest_of("another")}));
   EXPECT_FALSE(find({digest_of("another"), there}));
-  EXPECT_FALSE(look_at_place(frame, there, {}, kJob).value().stays) << "the same bytes";
-  EXPECT_FALSE(look_at_place(frame, there, {}, kJob).value().is_free);
+  EXPECT_FALSE(look_at_place(frame, there, {}).value().stays) << "the same bytes";
+  EXPECT_FALSE(look_at_place(frame, there, {}).value().is_free);
 
   fs::resize_file(frame, fs::file_size(frame) / 2);
   EXPECT_FALSE(find()) << "cut";
@@ -58,26 +59,28 @@ TEST_F(FramePlaceTest, OnlyAWholePictureOfOthersStays) {
 
 TEST_F(FramePlaceTest, WhatCannotBeReadIsAnError) {
   fs::create_directories(frame);
-  const auto found = look_at_place(frame, made, {}, kJob);
+  const auto found = look_at_place(frame, made, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().kind, ErrorKind::io) << "it may pass";
 }
 
-// Whatever the coordinator says, which may not know the other one.
-TEST_F(FramePlaceTest, WhatOthersHaveLockedStays) {
+// Whatever the coordinator says, which may not know the other one, or be a copy of the one that
+// knows.
+TEST_F(FramePlaceTest, WhatIsLockedStays) {
   const Digest there = put_picture(0.5f, "0123");
   const std::string name = frame.filename().string();
   ASSERT_TRUE(record_locks(folder, kJob.hex(), {{name}}));
-  EXPECT_FALSE(find({there})) << "its own lock";
+  EXPECT_TRUE(find({there})) << "nobody is asked to write what is locked here";
   ASSERT_TRUE(record_locks(folder, JobId{8}.hex(), {{"another.exr", name}}));
+  EXPECT_TRUE(find({there}));
+  ASSERT_TRUE(record_locks(folder, kJob.hex(), {}));
   EXPECT_TRUE(find({there}));
   ASSERT_TRUE(record_locks(folder, JobId{8}.hex(), {}));
   EXPECT_FALSE(find({there}));
-  ASSERT_TRUE(record_locks(folder, kJob.hex(), {}));
   EXPECT_FALSE(fs::exists(lock_folder(folder)));
 
   fs::create_directories(lock_folder(folder) / JobId{8}.hex());
-  const auto unknown = look_at_place(frame, made, {there}, kJob);
+  const auto unknown = look_at_place(frame, made, {there});
   ASSERT_FALSE(unknown) << "nothing is replaced while locks cannot be read";
   EXPECT_EQ(unknown.error().kind, ErrorKind::io);
 }

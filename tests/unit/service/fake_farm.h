@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "common/base/build.h"
+#include "common/base/file_stamp.h"
 #include "common/base/files.h"
 #include "common/job/text/job_json.h"
 #include "common/protocol/client.h"
@@ -99,6 +100,7 @@ class FakeWorker {
       const fs::path path = frame_path(job_, lease.task.frame());
       const std::string image = "image of seed " + std::to_string(job_.seed);
       EXPECT_TRUE(write_file_atomic(path, as_bytes_view(image)).ok());
+      done.frame = stamp_of(path).value().value_or(FileStamp());
       done.made.outputs.push_back(
           {BlobKind::image, lease.task.position, 0, digest_of(image), image.size()});
       return done;

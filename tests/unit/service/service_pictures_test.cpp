@@ -1,0 +1,130 @@
+#include <gmock/gmock.h>
+
+#include "tests/unit/service/frames_fixture.h"
+
+/// Whose picture it is that stands in the place of a frame.
+namespace baton {
+namespace {
+
+using namespace testing_service;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+// The coordinator was away, or the worker's report on its way.
+TEST_F(FramesTest, AFrameThatChangesBeforeItsReportIsSeen) {
+  for (const bool is_picture : {false, true}) {
+    SCOPED_TRACE(is_picture);
+    fs::remove_all(job.output.directory);
+    job.seed += 1;
+    document = make_job_document(job).value();
+    const RunningService service(options);
+    const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).version;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    const TaskDone report = worker.work(wait_for_frame_2(worker));
+    std::string other = is_picture ? std::string(kPicture) : std::string();
+    other.resize(report.made.outputs.front().size_bytes, '\0');
+    put(2, other);
+    worker.say(report);
+    const JobDetail detail = finish(service.endpoint(), worker, id);
+    EXPECT_THAT(detail.failures, SizeIs(0));
+    const std::string there = read_text_file(frame(2), 100).value();
+    if (is_picture) {
+      EXPECT_EQ(detail.summary.status, JobStatus::failed);
+      EXPECT_THAT(detail.waits, HasSubstr("frame.0002.exr is not what a job has written"));
+      EXPECT_EQ(there, other);
+    } else {
+      EXPECT_EQ(detail.summary.status, JobStatus::done);
+      EXPECT_THAT(there, HasSubstr("image of seed"));
+    }
+  }
+}
+
+// Another pattern makes the same file a frame of another number.
+TEST_F(FramesTest, ALockIsOfTheFileToo) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  put(2, std::string(kPicture));
+  ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}});
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  JobSpec renumbered = job;
+  renumbered.output.pattern = "frame.0##2.exr";
+  renumbered.frames = {FrameNumber(0), FrameNumber(1)};
+  for (const bool restart : {false, true}) {
+    EXPECT_THAT(
+        refused(service.endpoint(), SubmitJob{make_job_document(renumbered).value(), restart})
+            .message,
+        HasSubstr("frames 0 would write files"));
+  }
+  renumbered.frames = {FrameNumber(1)};
+  ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(renumbered).value(), true});
+  EXPECT_EQ(read_text_file(frame(2), 100).value(), kPicture);
+}
+
+// Another job has taken a frame of this folder with --restart; its former owner's is put back.
+TEST_F(FramesTest, AFormerJobsPictureThatIsPutBackIsKept) {
+  options.disk.picture_writer = [](const std::string&, const Bytes& bytes) {
+    const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    return text.starts_with("image of") ? std::optional(text) : std::nullopt;
+  };
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  const Digest former = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  EXPECT_EQ(finish(service.endpoint(), worker, former).summary.status, JobStatus::done);
+  const std::string of_former = read_text_file(frame(3), 100).value();
+  JobSpec other = job;
+  other.name = "other";
+  other.seed += 1;
+  const std::string theirs = make_job_document(other).value();
+  const Digest taken = ask<JobAccepted>(service.endpoint(), SubmitJob{theirs, true}).version;
+  FakeWorker next(service.endpoint(), store(), other, "next");
+  next.hello();
+  EXPECT_EQ(finish(service.endpoint(), next, taken).summary.status, JobStatus::done)
+      << "until there is one of its own a former picture makes way";
+  EXPECT_NE(read_text_file(frame(3), 100).value(), of_former);
+  put(3, of_former);
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{theirs}).message,
+              HasSubstr("frame.0003.exr is not what a job has written"));
+  EXPECT_EQ(read_text_file(frame(3), 100).value(), of_former);
+}
+
+// Written, and never reported: it is its job's, and no other replaces it unasked.
+TEST_F(FramesTest, AnotherJobReplacesNothingThatWasOnlyGranted) {
+  const RunningService service(options);
+  const Digest former = submit_former(service.endpoint());
+  FakeWorker late(service.endpoint(), store(), job, "late");
+  late.hello();
+  wait_for_frame_2(late);
+  put(2, std::string(kPicture) + writer_of(former));
+  ask<ShownJob>(service.endpoint(), CancelJob{former.hex()});
+  JobSpec other = job;
+  other.name = "other";
+  const std::string theirs = make_job_document(other).value();
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{theirs}).message,
+              HasSubstr("frame.0002.exr is not what a job has written"));
+  ask<JobAccepted>(service.endpoint(), SubmitJob{theirs, true});
+}
+
+// Once the frame is rendered, the picture that was given up for it is somebody's again.
+TEST_F(FramesTest, WhatWasGivenUpIsKeptOnceItsFrameIsRendered) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  put(2, std::string(kPicture));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::failed);
+  fs::remove(frame(3));  // so that the job stays open
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document, true});
+  const LeaseId lease = wait_for_frame_2(worker);
+  EXPECT_THAT(granted, testing::Contains(digest_of(std::string(kPicture))));
+  worker.say(worker.work(lease));
+  sync(worker);
+  fs::remove(frame(2));
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  wait_for_frame_2(worker);
+  EXPECT_THAT(granted, testing::Not(testing::Contains(digest_of(std::string(kPicture)))));
+}
+
+}  // namespace
+}  // namespace baton
