@@ -20,8 +20,6 @@ enum class ExrWindow : std::uint8_t { data, display, seen };
 /// What the header of a part says; of one that is not flat no channels.
 struct ExrPart {
   PartLayout layout;
-  /// Of its data, or of what it shows, if that is more.
-  std::int64_t num_pixels = 0;
   std::optional<Chromaticities> chromaticities;
 };
 /// The parts of an EXR file, one at least. Errors: those of read_exr.

@@ -205,8 +205,6 @@ Result<std::vector<ExrPart>> read_exr_parts(const std::filesystem::path& path) {
           const Imf::Header& header = file.header(p);
           ExrPart& part = parts.emplace_back();
           part.layout.name = header.hasName() ? header.name() : "";
-          part.num_pixels =
-              std::max(rect_of(header.dataWindow()).area(), rect_of(header.displayWindow()).area());
           const bool is_flat = !header.hasType() || Imf::isImage(header.type());
           if (is_flat) part.layout.channels = names_in(header);
           if (Imf::hasChromaticities(header))

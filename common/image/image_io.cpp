@@ -107,24 +107,6 @@ Result<RgbImage> read_rgb_image(const std::filesystem::path& path, ExrWindow win
                fmt::format("{}: neither an EXR nor a Radiance HDR picture", path.string())};
 }
 
-Result<std::int64_t> count_pixels(const std::filesystem::path& path) {
-  BATON_ASSIGN(const ImageFormat format, image_format(path));
-  if (format == ImageFormat::exr) {
-    BATON_ASSIGN(const std::vector<ExrPart> parts, read_exr_parts(path));
-    std::int64_t most = 0;
-    for (const ExrPart& part : parts) most = std::max(most, part.num_pixels);
-    return most;
-  }
-  // A header that is longer is none.
-  constexpr std::size_t kMostHeaderBytes = 1 << 16;
-  Bytes start(kMostHeaderBytes);
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(start.data()), static_cast<std::streamsize>(start.size()));
-  start.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, file.gcount())));
-  BATON_ASSIGN(const RadianceHeader header, read_radiance_header(start, path.string()));
-  return std::int64_t{header.width} * header.height;
-}
-
 Result<ImageColors> read_image_colors(const std::filesystem::path& path) {
   BATON_ASSIGN(const ImageFormat format, image_format(path));
   if (format == ImageFormat::exr) return read_exr_image_colors(path);

@@ -32,8 +32,6 @@ struct RgbImage {
 /// limits::kMaxEnvironmentSide, no colours (color_choice.h).
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path,
                                 ExrWindow window = ExrWindow::display);
-/// How many pixels read_rgb_image would read, by the header alone. Errors: it cannot be read.
-Result<std::int64_t> count_pixels(const std::filesystem::path& path);
 /// What read_rgb_image converts from: `chromaticities` of an EXR file; PRIMARIES, EXPOSURE and
 /// COLORCORR of a Radiance one. Of an image of one channel, only factors.
 Result<ImageColors> read_image_colors(const std::filesystem::path& path);

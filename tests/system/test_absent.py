@@ -202,7 +202,8 @@ def words_without_sense_are_refused(programs, _folder):
 def locks_go_where_they_were_put(programs, folder):
     def marked(place):
         files = Path(place).glob(".baton-locked/*")
-        return "".join(f"{file.name} {line}\n" for file in files for line in file.read_text(encoding="ascii").splitlines())
+        lines = ((file.name, line) for file in files for line in file.read_text(encoding="ascii").splitlines())
+        return "".join(f"{name} {line}\n" for name, line in lines if not line.startswith("#"))
 
     def make(name, output):
         job = make_job(folder / name, frames="1-2", name=name)

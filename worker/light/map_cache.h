@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -24,13 +23,11 @@ class MapCache {
   using MapPtr = std::shared_ptr<const EnvironmentMap>;
 
   using Reader = std::function<Result<RgbImage>(const std::string& path)>;
-  static Result<RgbImage> read_map(const std::string& path) { return read_rgb_image(path); }
 
-  /// most_bytes: that a map may take while it is read and prepared; 0: any.
-  explicit MapCache(const MemorySharePtr& share, Reader read = read_map,
-                    std::uint64_t most_bytes = 0)
+  explicit MapCache(
+      const MemorySharePtr& share,
+      Reader read = [](const std::string& path) { return read_rgb_image(path); })
       : read_(std::move(read)),
-        most_bytes_(most_bytes),
         maps_(share, [](const EnvironmentMap& map) { return map.size_bytes(); }) {}
 
   /// is_unchanged: asked of each file once it is read: an error says that it is not the one that is
@@ -40,7 +37,7 @@ class MapCache {
   }
   /// The map of a file with the size and table that `environment` and the other arguments, those
   /// of EnvironmentMap, ask for. A disk that is away for a moment is waited for. Error: a map that
-  /// cannot be read, has changed, or by its header does not fit.
+  /// cannot be read, or has changed.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
                      const HiddenCone& hidden = {}, float capped_share = 0);
   /// What is known of a map that was got with this scale; nothing of a map that was not.
@@ -59,10 +56,7 @@ class MapCache {
     auto operator<=>(const Key&) const = default;
   };
 
-  Status expect_room(const std::string& path, int max_width) const;
-
   const Reader read_;
-  const std::uint64_t most_bytes_;
   std::function<Status(const std::string& path)> is_unchanged_ = [](const auto&) {
     return Status();
   };

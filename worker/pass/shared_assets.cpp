@@ -26,7 +26,7 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
   }
   if (!accel) return accel.error();
   assets->accel = std::move(accel).value();
-  assets->maps = std::make_shared<MapCache>(memory.maps, MapCache::read_map, memory.total_bytes);
+  assets->maps = std::make_shared<MapCache>(memory.maps);
   return std::shared_ptr<const SharedAssets>(std::move(assets));
 }
 

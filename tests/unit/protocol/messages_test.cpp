@@ -190,7 +190,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x10\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x11\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -231,12 +231,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{17};
+  frames[0][5] = std::byte{18};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 17, this program speaks 16"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 18, this program speaks 17"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

@@ -1,6 +1,5 @@
 #include "worker/run/job_cache.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -297,22 +296,6 @@ TEST(MapCache, AMapIsReadOncePerTable) {
   coarse.max_width = 2;
   EXPECT_EQ(maps.get(path, coarse, false).value()->width(), 2);
   EXPECT_FALSE(maps.get("nowhere.exr", job.environment, false));
-}
-
-// By its header, before anything is taken for it.
-TEST(MapCache, AMapThatDoesNotFitIsRefused) {
-  const std::string path = testing::TempDir() + "huge.hdr";
-  ASSERT_TRUE(write_file_atomic(path, as_bytes_view("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n"
-                                                    "-Y 8192 +X 16384\n"))
-                  .ok());
-  EXPECT_EQ(count_pixels(path).value(), std::int64_t{16384} * 8192);
-  MapCache maps(std::make_shared<MemoryShare>(std::uint64_t{100} << 20), MapCache::read_map,
-                std::uint64_t{800} << 20);
-  const auto map = maps.get(path, {}, false);
-  ASSERT_FALSE(map.ok());
-  EXPECT_EQ(map.error().kind, ErrorKind::bad_input);
-  EXPECT_THAT(map.error().message, testing::HasSubstr("134.2 million pixels take some 5632 MiB"));
-  EXPECT_THAT(map.error().message, testing::HasSubstr("may use 800 MiB in all (--memory)"));
 }
 
 // An error of the moment is waited for; what is wrong with a map stays wrong.
