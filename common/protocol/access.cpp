@@ -96,6 +96,19 @@ Status make_own_keys(const fs::path& folder) {
              : Error{ErrorKind::io, fmt::format("{}: {}", folder.string(), error.message())};
 }
 
+/// Removes the notes of coordinators that were killed and whose work folders are gone.
+void forget_lost_keys(const fs::path& notes) {
+  std::error_code error;
+  for (fs::directory_iterator note(notes, error), end; !error && note != end;
+       note.increment(error)) {
+    std::error_code gone;
+    const fs::path keys = noted_keys(note->path());
+    if (!keys.empty() && fs::exists(keys.parent_path().parent_path(), gone) &&
+        !fs::exists(keys, gone) && !gone)
+      fs::remove(note->path(), gone);
+  }
+}
+
 }  // namespace
 
 bool is_of_this_machine(const std::string& endpoint) {
@@ -139,8 +152,13 @@ Result<ServerAccess> server_access(const std::string& key_file, bool insecure,
   if (insecure || !is_open_to_users(endpoint)) return access;
   std::error_code error;
   access.own_keys = fs::absolute(work_dir, error) / "own-keys";
-  if (!fs::exists(access.own_keys / "server.key", error)) BATON_TRY(make_own_keys(access.own_keys));
-  Result<ServerKey> own = read_server_key(access.own_keys / "server.key");
+  const fs::path server_key = access.own_keys / "server.key";
+  if (!fs::exists(server_key, error)) BATON_TRY(make_own_keys(access.own_keys));
+  if (!is_mine(server_key)) {
+    return Error{ErrorKind::usage,
+                 server_key.string() + ": is not this user's own: remove it, or give --key"};
+  }
+  Result<ServerKey> own = read_server_key(server_key);
   if (!own) {
     return Error{own.error().kind,
                  own.error().message +
@@ -167,6 +185,7 @@ OwnKeysNote::OwnKeysNote(const std::string& endpoint, const ServerAccess& access
     fs::create_directories(file_.parent_path(), error);
     fs::permissions(file_.parent_path(), fs::perms::owner_all, error);
     written = write_file_atomic(file_, as_bytes_view(keys_.string() + "\n"));
+    forget_lost_keys(file_.parent_path());
   }
   if (!written)
     spdlog::warn("other programs do not find the keys by themselves, give them --key {}: {}",

@@ -64,7 +64,7 @@ Result<Message> RequestClient::request(const Message& message, std::chrono::mill
 
   // Wait for the one answer; a signal may end a wait early.
   std::optional<std::vector<Bytes>> frames;
-  while (!frames && Clock::now() < deadline) {
+  while (!frames && Clock::now() < deadline && !socket_.is_denied()) {
     frames = socket_.receive(std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()));
   }
   if (!frames) return give_up(fmt::format("no coordinator answered within {} ms", timeout.count()));

@@ -113,7 +113,6 @@ struct Socket::Impl {
     if (doorkeeper) items.push_back({doorkeeper->questions().handle(), 0, ZMQ_POLLIN, 0});
     return items;
   }
-  /// That it will not be let in: it was told so, or was broken off again and again.
   bool is_denied() const {
     return watch.failure() == ConnectionWatch::Failure::denied || num_failed >= kMostFailures;
   }
@@ -314,6 +313,8 @@ std::optional<Error> Socket::take_refusal() {
                            "one is of another coordinator",
                            impl_->endpoint)};
 }
+
+bool Socket::is_denied() const { return impl_->is_denied(); }
 
 bool Socket::was_connected() const { return impl_->watch.was_connected(); }
 

@@ -58,6 +58,8 @@ class Socket {
   /// Why a connection was refused, by either side, once. usage: the key is not known, or the
   /// other side spoke against the rules; timeout: it was broken off, which may have other reasons.
   std::optional<Error> take_refusal();
+  /// Whether it will not be let in: it was told so, or was broken off again and again.
+  bool is_denied() const;
   /// Whether a connection to the other side stood at some time; its program need not have taken it.
   bool was_connected() const;
   /// Ends a receive() that is under way, or the next one, early. From any thread.

@@ -77,13 +77,13 @@ inline constexpr const char* kSchema = R"sql(
 /// empty where they were mixed. Where other tables say `job`, they mean the digest of a document: a
 /// version. `versions` says of which job (JobId) it is the n-th, `identities` when what happened to
 /// that job, `locked_frames` which of its frames count as done whatever is in their files and
-/// `lock_times` when that last changed,
-/// `priorities` which priority a person has set in place of the one that is written in its
-/// document, `growth` how it has come by its sweeps. `pictures_given_up` are those that a job may
-/// replace though no job has written them; `marked_folders` what output folders were, without
-/// links, when a job marked them, or a frame in them was locked. `events` is appended to alone
-/// (FarmEvent), without an index, which would cost more than it saves; its last row stays, so that
-/// no number is given twice. Of those that are old, `event_sums` keeps count and seconds.
+/// `lock_times` when that last changed, `priorities` which priority a person has set in place of
+/// the one that is written in its document, `growth` how it has come by its sweeps.
+/// `pictures_given_up` are those that a job may replace though no job has written them;
+/// `marked_folders` what output folders were, without links, when a job marked them, or a frame in
+/// them was locked. `events` is appended to alone (FarmEvent), without an index, which would cost
+/// more than it saves; its last row stays, so that no number is given twice. Of those that are old,
+/// `event_sums` keeps count and seconds.
 inline constexpr const char* kLaterTables = R"sql(
   CREATE TABLE IF NOT EXISTS frame_files (
     job TEXT NOT NULL, frame INTEGER NOT NULL, digest TEXT NOT NULL,

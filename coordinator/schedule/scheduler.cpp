@@ -259,13 +259,7 @@ void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) 
   const Failure& failure = event.failure;
   if (!leases_.touch(failure.worker, now)) return;
   const Claim claim = find_claim(failure.worker, failure.lease, now, actions);
-  if (!claim.job) return;
-  // Of what an earlier coordinator granted nobody here knows whether it did.
-  if (failure.lease.epoch == rules_.epoch) {
-    fail_attempt(claim, failure, now, actions);
-  } else {
-    return_lease(claim, failure.lease, failure.message, actions);
-  }
+  if (claim.job) fail_attempt(claim, failure, now, actions);
 }
 
 void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {
@@ -400,6 +394,11 @@ void Scheduler::reopen(RecordReopened record, Job& job, Actions& actions) {
 }
 
 void Scheduler::fail_attempt(const Claim& claim, Failure failure, TimePoint now, Actions& actions) {
+  // Of what an earlier coordinator granted nobody here knows whether it did.
+  if (failure.lease.epoch != rules_.epoch) {
+    return_lease(claim, failure.lease, failure.message, actions);
+    return;
+  }
   const Digest digest = failure.lease.job;
   Job& job = *claim.job;
   end_lease(digest, claim.task, LeaseEnd::failed, failure.message, actions);

@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -38,13 +39,19 @@ std::uint64_t memory_mib_of_each(const FarmOptions& options) {
   return std::max<std::uint64_t>(1, (all >> 20) / static_cast<std::uint64_t>(options.workers));
 }
 
-/// Programs append to their logs: one that has grown long goes on empty, and is kept once.
+/// Programs append to their logs: one that has grown long goes on empty, and is kept once. No link
+/// that stands in the place of either is followed.
 void put_aside_long(const fs::path& log) {
-  std::error_code error;
-  const std::uintmax_t size = fs::file_size(log, error);
-  if (error || size <= limits::kMaxLogBytes) return;
-  fs::copy_file(log, log.string() + ".1", fs::copy_options::overwrite_existing, error);
-  if (!error) fs::resize_file(log, 0, error);
+  struct stat status {};
+  if (::lstat(log.c_str(), &status) != 0 || !S_ISREG(status.st_mode) ||
+      status.st_size <= static_cast<off_t>(limits::kMaxLogBytes))
+    return;
+  const FileDescriptor file(::open(log.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
+  const Result<Bytes> text = read_file(log, 8 * limits::kMaxLogBytes);
+  const Status kept =
+      text ? write_file_unsynced(log.string() + ".1", *text, 0600) : Status(text.error());
+  const bool is_empty = kept && file && ::ftruncate(file.number(), 0) == 0;
+  if (!is_empty && !kept) spdlog::warn("a log is not put aside: {}", kept.error().message);
 }
 
 /// Of a farm that was killed in this work folder.

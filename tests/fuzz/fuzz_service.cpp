@@ -9,10 +9,10 @@
 #include <string>
 
 #include "common/base/build.h"
-#include "common/base/files.h"
 #include "common/job/text/job_json.h"
 #include "coordinator/service/service.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/support/farm_job.h"
 
 namespace baton {
 namespace {
@@ -37,17 +37,7 @@ class Coordinator {
   Coordinator() {
     fs::remove_all(folder_);
     fs::create_directories(folder_ / "out");
-    BATON_CHECK(write_file_atomic(folder_ / "sky.hdr", as_bytes_view("sky")).ok());
-    JobSpec job;
-    job.name = "test";
-    job.sampling.method = Method::sequential;
-    for (int frame = 2; frame <= 4; ++frame) job.frames.emplace_back(frame);
-    job.image = {.width = 16, .height = 8, .sites = 1, .tile_size = 8};
-    job.scene.materials["grey"] = {};
-    job.scene.ground = GroundSpec{.material = "grey"};
-    job.environment.keys = {{1, (folder_ / "sky.hdr").string()}};
-    job.output.directory = (folder_ / "out").string();
-    job.state.checkpoint_every = 2;
+    const JobSpec job = test::farm_job(folder_);
     const std::string document = make_job_document(job).value();
     job_ = digest_of(document);
     ServiceOptions options{"inproc://fuzz", folder_ / "work"};

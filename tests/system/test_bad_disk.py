@@ -90,7 +90,7 @@ def a_file_in_place_of_the_store_is_waited_for(programs, folder):
     with Farm(programs, folder / "farm", workers=1) as farm:
         ident = farm.submit(write_job(folder / "job.json", moving(folder)))
         wait_until(lambda: farm.show(ident)["framesDone"] >= 1, "a frame is done")
-        store = folder / "farm/work/store"
+        store = farm.work_folder / "store"
         away = store.rename(store.with_name("away"))
         store.write_text("no folder", encoding="ascii")
         wait_until(lambda: "a folder in the place of" in farm.show(ident).get("waits", ""), "it waits")

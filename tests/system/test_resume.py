@@ -85,6 +85,21 @@ def nobody_else_reaches_a_render(programs, folder):
     check(not place.exists() and not after.exists(), f"left: {place}, {after}")
 
 
+def a_long_log_is_put_aside(programs, folder):
+    """Once; and through no link that somebody has laid into the folder."""
+    path, work, secret = make(folder), folder / "work", folder / "secret"
+    work.mkdir()
+    secret.write_text("kept", encoding="ascii")
+    log, aside = work / "coordinator.log", work / "coordinator.log.1"
+    log.write_text("an old line\n" * (3 << 20), encoding="ascii")
+    aside.symlink_to(secret)
+    programs.render(path, work)
+    check_equal(secret.read_text(encoding="ascii"), "kept", "what the link led to")
+    check(not aside.is_symlink() and aside.read_text(encoding="ascii").startswith("an old line"), "the old log is beside it")
+    check_equal(oct(aside.stat().st_mode & 0o777), "0o600", "rights of the old log")
+    check(log.stat().st_size < 1 << 20 and "old line" not in log.read_text(encoding="ascii"), "the log goes on empty")
+
+
 def an_edited_job_does_not_mix_with_the_one_before(programs, folder):
     """Rendered, edited and rendered, edited back and rendered: each time the frames are the job's own, or it is refused."""
     first = write_job(folder / "job.json", make_job(folder, frames="1-4"))

@@ -18,6 +18,7 @@
 #include "common/protocol/worker_channel.h"
 #include "common/store/blob_store.h"
 #include "coordinator/service/service.h"
+#include "tests/support/farm_job.h"
 #include "tests/support/patience.h"
 
 namespace baton::testing_service {
@@ -152,16 +153,7 @@ struct ServiceTest : testing::Test {
   void SetUp() override {
     fs::remove_all(folder);
     fs::create_directories(folder);
-    ASSERT_TRUE(write_file_atomic(folder / "sky.hdr", as_bytes_view("sky")).ok());
-    job.name = "test";
-    job.sampling.method = Method::sequential;
-    for (int frame = 2; frame <= 4; ++frame) job.frames.emplace_back(frame);
-    job.image = {.width = 16, .height = 8, .sites = 1, .tile_size = 8};
-    job.scene.materials["grey"] = {};
-    job.scene.ground = GroundSpec{.material = "grey"};
-    job.environment.keys = {{1, (folder / "sky.hdr").string()}};
-    job.output.directory = (folder / "out").string();
-    job.state.checkpoint_every = 2;
+    job = test::farm_job(folder);
     const Result<std::string> made = make_job_document(job);
     ASSERT_TRUE(made.ok()) << made.error().message;
     document = *made;
