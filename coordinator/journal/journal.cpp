@@ -216,18 +216,21 @@ Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int cou
 
 Result<std::map<FrameIndex, FrameFile>> Journal::frame_files(const Digest& job) {
   BATON_ASSIGN(SqlStatement query,
-               database_.prepare("SELECT frame, digest, size_bytes, inode, time_ns "
-                                 "FROM frame_files WHERE job = ?"));
+               database_.prepare("SELECT frame, '', 0, 0, 0, 1 FROM rendered_frames WHERE job = ?1 "
+                                 "UNION ALL SELECT frame, digest, size_bytes, inode, time_ns, 0 "
+                                 "FROM frame_files WHERE job = ?1"));
   query.bind(job);
   std::map<FrameIndex, FrameFile> files;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return files;
-    const Digest digest = Digest::from_hex(query.text(1)).value_or(Digest());
-    files[FrameIndex(static_cast<std::int32_t>(query.integer(0)))] = {
-        digest, FileStamp{.size_bytes = static_cast<std::uint64_t>(query.integer(2)),
-                          .inode = static_cast<std::uint64_t>(query.integer(3)),
-                          .time_ns = query.integer(4)}};
+    FrameFile& file = files[FrameIndex(static_cast<std::int32_t>(query.integer(0)))];
+    file.is_gone = query.integer(5) != 0;
+    file.was_rendered = file.was_rendered || file.is_gone;
+    file.digest = Digest::from_hex(query.text(1)).value_or(Digest());
+    file.stamp = {.size_bytes = static_cast<std::uint64_t>(query.integer(2)),
+                  .inode = static_cast<std::uint64_t>(query.integer(3)),
+                  .time_ns = query.integer(4)};
   }
 }
 
@@ -291,7 +294,8 @@ Status Journal::delete_job(const Digest& job) {
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM owners WHERE job = ?",
-        "DELETE FROM frame_files WHERE job = ?", "DELETE FROM output_marks WHERE job = ?",
+        "DELETE FROM frame_files WHERE job = ?", "DELETE FROM rendered_frames WHERE job = ?",
+        "DELETE FROM output_marks WHERE job = ?",
         "DELETE FROM marked_folders WHERE job = ?", "DELETE FROM versions WHERE document = ?",
         "DELETE FROM renderers WHERE job = ?", "DELETE FROM mixed_jobs WHERE job = ?",
         "DELETE FROM former_renderers WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"})
@@ -351,6 +355,10 @@ Status Journal::record_frame_file(const Digest& job, FrameIndex frame,
   if (!file) {
     return change("DELETE FROM frame_files WHERE job = ? AND frame = ?", job,
                   std::int64_t{frame.value()});
+  }
+  if (file->was_rendered) {
+    BATON_TRY(change("INSERT OR IGNORE INTO rendered_frames VALUES (?, ?)", job,
+                     std::int64_t{frame.value()}));
   }
   return change(
       "INSERT OR REPLACE INTO frame_files (job, frame, digest, size_bytes, inode, time_ns) "

@@ -35,6 +35,10 @@ struct FrameFile {
   /// Digest(): a worker may have written it, and nothing else is known.
   Digest digest;
   FileStamp stamp;
+  /// Whether its worker has ever reported it, though that may be forgotten since.
+  bool was_rendered = false;
+  /// Whether nothing else is known: what a worker wrote there is not in its place any more.
+  bool is_gone = false;
 };
 
 /// Which version of which job a document is.
@@ -144,7 +148,8 @@ class Journal {
   /// By what this coordinator has had a document rendered, also before it began again; an empty one
   /// among them: by any. None: nothing of it is rendered yet.
   Result<std::set<std::string>> renderers(const Digest& job);
-  /// nullopt: the job's file of the frame is not in its place any more.
+  /// nullopt: the job's file of the frame is not in its place any more. That one was rendered is
+  /// remembered as long as the job is.
   Status record_frame_file(const Digest& job, FrameIndex frame,
                            const std::optional<FrameFile>& file);
   /// folder: that is marked now; nullopt: the mark goes.

@@ -71,7 +71,8 @@ inline constexpr const char* kSchema = R"sql(
 
 /// Tables that a journal of this version may lack: it gets them when it is opened, and an earlier
 /// program leaves them alone. `frame_files` says how a frame's file stood when it had this digest
-/// (none: a worker may have written it), `output_marks` of which open jobs the output folder is
+/// (none: a worker may have written it), `rendered_frames` which frames a job has had, whatever has
+/// become of them since, `output_marks` of which open jobs the output folder is
 /// marked; store_token has one row, or none. `renderers`: by what the tasks of a job were done that
 /// are done, the last ones of `mixed_jobs`; `former_renderers`: by what those that are forgotten,
 /// empty where they were mixed. Where other tables say `job`, they mean the digest of a document: a
@@ -89,6 +90,8 @@ inline constexpr const char* kLaterTables = R"sql(
     job TEXT NOT NULL, frame INTEGER NOT NULL, digest TEXT NOT NULL,
     size_bytes INTEGER NOT NULL, inode INTEGER NOT NULL, time_ns INTEGER NOT NULL,
     PRIMARY KEY (job, frame)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS rendered_frames (
+    job TEXT NOT NULL, frame INTEGER NOT NULL, PRIMARY KEY (job, frame)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS output_marks (job TEXT PRIMARY KEY) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS store_token (token TEXT NOT NULL);
   CREATE TABLE IF NOT EXISTS renderers (job TEXT PRIMARY KEY, renderer TEXT NOT NULL) WITHOUT ROWID;

@@ -36,9 +36,12 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
     Writer& writer = record.jobs_[other];
     BATON_ASSIGN(writer.renderers, journal.renderers(other));
     BATON_ASSIGN(const auto granted, journal.frame_files(other));
+    std::set<fs::path> lost;
     for (const auto& [frame, file] : granted) {
-      if (frame.index() < document->job.frames.size())
-        writer.granted.insert(frame_path(document->job, frame));
+      if (frame.index() >= document->job.frames.size()) continue;
+      const fs::path path = frame_path(document->job, frame);
+      if (!file.is_gone) writer.granted.insert(path);
+      if (file.was_rendered) lost.insert(path);
     }
     // What another job had when it ended, less what it has lost since.
     std::optional<JobDetail> ended;
@@ -52,10 +55,13 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
       const bool is_given_away =
           ended && std::ranges::find(ended->frames_done, document->job.frames[frame.index()]) ==
                        ended->frames_done.end();
-      record.images_[frame_path(document->job, frame)].push_back(
-          {other, done.made.outputs.front(), is_given_away});
+      const fs::path path = frame_path(document->job, frame);
+      record.images_[path].push_back({other, done.made.outputs.front(), is_given_away});
+      lost.erase(path);
       return {};
     }));
+    for (const fs::path& path : lost)
+      record.images_[path].push_back({.job = other, .image = {}, .is_lost = true});
   }
   record.mark_superseded();
   return record;
@@ -65,8 +71,11 @@ void FolderRecord::mark_superseded() {
   const auto age = [&](const Image& image) {
     return std::ranges::find(family_, image.job) - family_.begin();
   };
+  const auto was_had = [](const Image& image) {
+    return image.is_lost || !image.image.is_placeholder();
+  };
   const auto is_of_job = [&](const Image& image) {
-    return age(image) < std::ssize(family_) && !image.image.is_placeholder();
+    return age(image) < std::ssize(family_) && was_had(image);
   };
   for (auto& [path, images] : images_) {
     std::ptrdiff_t newest = -1;
@@ -74,9 +83,8 @@ void FolderRecord::mark_superseded() {
       if (is_of_job(image)) newest = std::max(newest, age(image));
     }
     // One that was given away stays what it is until there is another in its place.
-    const bool has_owner = std::ranges::any_of(images, [](const Image& image) {
-      return !image.is_given_away && !image.image.is_placeholder();
-    });
+    const bool has_owner = std::ranges::any_of(
+        images, [&](const Image& image) { return !image.is_given_away && was_had(image); });
     for (Image& image : images) {
       image.is_superseded =
           image.job != version_ &&
@@ -90,7 +98,7 @@ std::vector<BlobRef> FolderRecord::images_of(const fs::path& path) const {
   const auto found = images_.find(path);
   if (found == images_.end()) return recorded;
   for (const Image& image : found->second) {
-    if (!image.is_superseded) recorded.push_back(image.image);
+    if (!image.is_superseded && !image.is_lost) recorded.push_back(image.image);
   }
   return recorded;
 }
@@ -114,8 +122,9 @@ bool FolderRecord::may_be_unreported(const fs::path& path, const FileVerdict& pi
                         });
   const auto images = images_.find(path);
   const bool is_reported =
-      images != images_.end() &&
-      std::ranges::find(images->second, job, &Image::job) != images->second.end();
+      images != images_.end() && std::ranges::any_of(images->second, [&](const Image& image) {
+        return image.job == job && !image.is_lost;
+      });
   const bool is_of_job = std::ranges::find(family_, job) != family_.end();
   return is_by_us && !is_reported &&
          (job == version_ || (is_of_job && writer->second.granted.contains(path)));

@@ -84,10 +84,41 @@ TEST_F(FramesTest, AFormerJobsPictureThatIsPutBackIsKept) {
   EXPECT_EQ(finish(service.endpoint(), next, taken).summary.status, JobStatus::done)
       << "until there is one of its own a former picture makes way";
   EXPECT_NE(read_text_file(frame(3), 100).value(), of_former);
-  put(3, of_former);
-  EXPECT_THAT(refused(service.endpoint(), SubmitJob{theirs}).message,
-              HasSubstr("frame.0003.exr is not what a job has written"));
-  EXPECT_EQ(read_text_file(frame(3), 100).value(), of_former);
+  const auto expect_kept = [&] {
+    put(3, of_former);
+    EXPECT_THAT(refused(service.endpoint(), SubmitJob{theirs}).message,
+                HasSubstr("frame.0003.exr is not what a job has written"));
+    EXPECT_EQ(read_text_file(frame(3), 100).value(), of_former);
+  };
+  expect_kept();
+  // Nor while its own is to be rendered once more.
+  fs::remove(frame(3));
+  ask<JobAccepted>(service.endpoint(), SubmitJob{theirs});
+  ask<ShownJob>(service.endpoint(), CancelJob{taken.hex()});
+  expect_kept();
+}
+
+// The same of a former version of the job.
+TEST_F(FramesTest, AFormerVersionsPictureIsKeptThoughTheNewerOneIsGone) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  const Digest former = submit_former(service.endpoint());
+  EXPECT_EQ(finish(service.endpoint(), worker, former).summary.status, JobStatus::done);
+  const std::string of_former = read_text_file(frame(2), 100).value();
+  JobSpec newer = job;
+  newer.seed += 1;
+  const std::string text = make_job_document(newer).value();
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{text, true}).version;
+  FakeWorker next(service.endpoint(), store(), newer, "next");
+  next.hello();
+  EXPECT_EQ(finish(service.endpoint(), next, id).summary.status, JobStatus::done);
+  EXPECT_NE(read_text_file(frame(2), 100).value(), of_former);
+  fs::remove(frame(2));
+  ask<JobAccepted>(service.endpoint(), SubmitJob{text});
+  put(2, of_former);
+  wait_for_frame_2(next);
+  EXPECT_THAT(granted, testing::Not(testing::Contains(digest_of(of_former))));
 }
 
 // Written, and never reported: it is its job's, and no other replaces it unasked.
