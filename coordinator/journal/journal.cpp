@@ -295,10 +295,10 @@ Status Journal::delete_job(const Digest& job) {
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM owners WHERE job = ?",
         "DELETE FROM frame_files WHERE job = ?", "DELETE FROM rendered_frames WHERE job = ?",
-        "DELETE FROM output_marks WHERE job = ?",
-        "DELETE FROM marked_folders WHERE job = ?", "DELETE FROM versions WHERE document = ?",
-        "DELETE FROM renderers WHERE job = ?", "DELETE FROM mixed_jobs WHERE job = ?",
-        "DELETE FROM former_renderers WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"})
+        "DELETE FROM output_marks WHERE job = ?", "DELETE FROM marked_folders WHERE job = ?",
+        "DELETE FROM versions WHERE document = ?", "DELETE FROM renderers WHERE job = ?",
+        "DELETE FROM mixed_jobs WHERE job = ?", "DELETE FROM former_renderers WHERE job = ?",
+        "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   BATON_TRY(change("DELETE FROM growth WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM priorities WHERE id NOT IN (SELECT id FROM versions)"));

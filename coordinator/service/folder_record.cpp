@@ -214,9 +214,21 @@ std::string numbers_text(const std::vector<FramesInDoubt::Frame>& frames) {
   return format_frames(numbers);
 }
 
+/// Under which numbers the files of frames are a job's, as far as they are; empty: none is.
+std::string numbers_text(const std::vector<FramesInDoubt::Frame>& frames, const JobSpec& job) {
+  std::vector<FrameNumber> numbers;
+  for (const FrameNumber number : job.frames) {
+    const fs::path path =
+        fs::path(job.output.directory) / frame_file_name(job.output.pattern, number.value());
+    if (std::ranges::find(frames, path.string(), &FramesInDoubt::Frame::file) != frames.end())
+      numbers.push_back(number);
+  }
+  return numbers.empty() ? "" : format_frames(numbers);
+}
+
 }  // namespace
 
-std::string doubt_text(const FramesInDoubt& doubt, const JobId& job) {
+std::string doubt_text(const FramesInDoubt& doubt, const JobId& job, const JobSpec* known) {
   std::string text;
   if (const auto& frames = doubt.strange; !frames.empty()) {
     const bool is_one = frames.size() == 1;
@@ -228,9 +240,10 @@ std::string doubt_text(const FramesInDoubt& doubt, const JobId& job) {
                       "coordinator's)"
                     : "another picture, changed or replaced",
         is_one ? "it" : "them");
-    if (!job.empty())
+    const std::string numbers = known ? numbers_text(frames, *known) : numbers_text(frames);
+    if (!job.empty() && !numbers.empty())
       text += fmt::format(", `baton job lock {} --frames {}` keeps {} for good", job.short_hex(),
-                          numbers_text(frames), is_one ? "it" : "them");
+                          numbers, is_one ? "it" : "them");
   }
   if (const auto& frames = doubt.locked_absent; !frames.empty()) {
     const bool is_one = frames.size() == 1;
@@ -243,8 +256,8 @@ std::string doubt_text(const FramesInDoubt& doubt, const JobId& job) {
   return text;
 }
 
-std::string fault_text(const OddFrames& odd, const JobId& job) {
-  return odd.unreadable.empty() ? doubt_text(odd.doubt, job) : odd.unreadable;
+std::string fault_text(const OddFrames& odd, const JobId& job, const JobSpec* known) {
+  return odd.unreadable.empty() ? doubt_text(odd.doubt, job, known) : odd.unreadable;
 }
 
 }  // namespace baton

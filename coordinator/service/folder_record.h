@@ -96,8 +96,10 @@ struct FramesInDoubt {
   bool empty() const { return strange.empty() && locked_absent.empty(); }
 };
 /// For people: which they are, and the ways on. job: whose frames they are; empty: it is new, and
-/// nothing of it can be locked.
-std::string doubt_text(const FramesInDoubt& doubt, const JobId& job);
+/// nothing of it can be locked. known: the job as it is, whose frames can be locked, where that is
+/// another document.
+std::string doubt_text(const FramesInDoubt& doubt, const JobId& job,
+                       const JobSpec* known = nullptr);
 
 /// The files in the places of a job's frames that are not what its folder's jobs have recorded.
 struct OddFrames {
@@ -107,7 +109,7 @@ struct OddFrames {
   std::string unreadable;
 };
 /// For people: what is wrong with them; empty: nothing.
-std::string fault_text(const OddFrames& odd, const JobId& job);
+std::string fault_text(const OddFrames& odd, const JobId& job, const JobSpec* known = nullptr);
 /// restart: all that is not recorded is in doubt.
 OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& spec,
                           const LockedFrames& locked, bool restart = false);

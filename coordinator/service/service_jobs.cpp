@@ -235,7 +235,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   }
   const Scheduler::Job* const known = farm_.scheduler.find_job(document->digest);
   const bool runs = known != nullptr && known->status == JobStatus::running;
-  const std::string fault = fault_text(*odd, id);
+  const std::optional<JobSpec> newest = submission.newest_spec(id);
+  const std::string fault = fault_text(*odd, id, newest ? &*newest : nullptr);
   const bool may_replace = message.restart && odd->doubt.locked_absent.empty();
   if (!odd->unreadable.empty() && !may_replace && !runs && may_pass(document->digest))
     return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + odd->unreadable});

@@ -225,14 +225,19 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
   return begin(peer, document, message, std::move(reasons));
 }
 
+std::optional<JobSpec> Submission::newest_spec(const JobId& job) {
+  const std::vector<Digest> versions = farm_.history.jobs().versions(job);
+  if (versions.empty()) return std::nullopt;
+  const Result<std::optional<std::string>> text = farm_.journal.document(versions.back());
+  const auto document = parse_farm_document(text && *text ? **text : std::string());
+  return document ? std::optional(document->job) : std::nullopt;
+}
+
 /// What the document makes another of a job that is known; empty: nothing of its place in the queue
 /// and of its frames.
 std::string Submission::changes_text(const ParsedJobDocument& document, const JobId& job,
                                      bool keep_priority) {
-  const std::vector<Digest> versions = farm_.history.jobs().versions(job);
-  if (versions.empty()) return {};
-  const Result<std::optional<std::string>> text = farm_.journal.document(versions.back());
-  const auto before = parse_farm_document(text && *text ? **text : std::string());
+  const std::optional<JobSpec> before = newest_spec(job);
   if (!before) return {};
   std::vector<std::string> changes;
   const auto compare = [&](const char* what, auto is, auto was) {
@@ -240,9 +245,9 @@ std::string Submission::changes_text(const ParsedJobDocument& document, const Jo
   };
   const IdentityBook& known = farm_.history.jobs();
   const std::int32_t written = document.job.priority;
-  compare("frames", format_frames(document.job.frames), format_frames(before->job.frames));
+  compare("frames", format_frames(document.job.frames), format_frames(before->frames));
   compare("priority", keep_priority ? known.priority(job, written) : written,
-          known.priority(job, before->job.priority));
+          known.priority(job, before->priority));
   return fmt::format("{}", fmt::join(changes, "; "));
 }
 

@@ -31,6 +31,8 @@ class Submission {
   /// Errors (bad_input, usage): why the document would be refused without --restart beside the jobs
   /// of its folder.
   Status expect_free_folder(const ParsedJobDocument& document);
+  /// A job by the newest of its documents; nullopt: it is new, or deleted.
+  std::optional<JobSpec> newest_spec(const JobId& job);
   /// The job that the document is a version of, or becomes one; empty: a new one.
   Result<JobId> known_job(const ParsedJobDocument& document);
   /// A document of a job that may grow gets the sweeps that jobs of its picture have written in its

@@ -62,6 +62,26 @@ TEST_F(FramesTest, ALockIsOfTheFileToo) {
   EXPECT_EQ(read_text_file(frame(2), 100).value(), kPicture);
 }
 
+// What a refusal advises can be done: it names frames as the job has them.
+TEST_F(FramesTest, LocksAreAdvisedForFramesThatTheJobHas) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  JobSpec longer = job;
+  longer.frames.push_back(FrameNumber(5));
+  put(5, std::string(kPicture));
+  EXPECT_THAT(
+      refused(service.endpoint(), SubmitJob{make_job_document(longer).value()}).message,
+      testing::AllOf(HasSubstr("frame.0005.exr is not"), testing::Not(HasSubstr("job lock"))));
+  JobSpec renumbered = job;
+  renumbered.output.pattern = "frame.0##2.exr";
+  renumbered.frames = {FrameNumber(0)};
+  put(2, std::string(kPicture));
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{make_job_document(renumbered).value()}).message,
+              HasSubstr("--frames 2` keeps it"));
+}
+
 // Another job has taken a frame of this folder with --restart; its former owner's is put back.
 TEST_F(FramesTest, AFormerJobsPictureThatIsPutBackIsKept) {
   options.disk.picture_writer = [](const std::string&, const Bytes& bytes) {
