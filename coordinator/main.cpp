@@ -1,17 +1,21 @@
+#include <fmt/format.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <cstdio>
 #include <filesystem>
 
 #include "common/base/build.h"
+#include "common/base/command_pages.h"
 #include "common/base/exit_codes.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/base/log.h"
 #include "common/base/option_values.h"
+#include "common/base/settings.h"
 #include "common/image/exr_check.h"
 #include "coordinator/service/service.h"
 
@@ -41,7 +45,8 @@ void add_rights(CLI::App& app, baton::ServiceOptions& options, std::string& key_
                "listen without a key: whoever reaches the address may do everything");
   app.add_option("--root", options.roots,
                  "folder that jobs may read from and write to, may be repeated; needed where other "
-                 "machines reach the coordinator; default elsewhere: all");
+                 "machines reach the coordinator; default elsewhere: all")
+      ->envname("BATON_ROOT");
   app.add_option("--user-priority", options.user_priority,
                  "the highest priority that a user's key may give")
       ->check(CLI::Range(0, baton::limits::kMaxPriority))
@@ -115,6 +120,11 @@ int main(int argc, char** argv) {
                  "wait; default: as the disk has room")
       ->envname("BATON_STORE_LIMIT")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
+  baton::add_page_options<CLI::Success>(app);
+  if (const auto settings = baton::take_settings(baton::describe_command(app)); !settings) {
+    fmt::print(stderr, "{}\n", settings.error().message);
+    return static_cast<int>(baton::exit_code_of(settings.error().kind));
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

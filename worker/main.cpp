@@ -10,9 +10,11 @@
 #include <cstdio>
 #include <thread>
 
+#include "common/base/command_pages.h"
 #include "common/base/legible.h"
 #include "common/base/log.h"
 #include "common/base/option_values.h"
+#include "common/base/settings.h"
 #include "worker/run/crash_handler.h"
 #include "worker/run/replay.h"
 #include "worker/run/worker.h"
@@ -172,7 +174,8 @@ int main(int argc, char** argv) {
   app.add_option("--key", key_file, "worker.key of `baton key create`")->envname("BATON_KEY");
   app.add_flag("--insecure", insecure, "connect without a key");
   app.add_option("--root", worker.machine.roots,
-                 "folder that jobs may read from and write to, may be repeated; default: all");
+                 "folder that jobs may read from and write to, may be repeated; default: all")
+      ->envname("BATON_ROOT");
 
   PilotOptions pilot;
   add_pilot_options(app, pilot);
@@ -181,6 +184,11 @@ int main(int argc, char** argv) {
   std::vector<int> pixel;
   CLI::App* const replay_command = add_replay_command(app, replay_options, pixel);
 
+  baton::add_page_options<CLI::Success>(app);
+  if (const auto settings = baton::take_settings(baton::describe_command(app)); !settings) {
+    fmt::print(stderr, "{}\n", settings.error().message);
+    return static_cast<int>(baton::exit_code_of(settings.error().kind));
+  }
   try {
     app.parse(argc, argv);
     if (!replay_command->parsed() && worker.endpoint.empty())

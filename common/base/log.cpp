@@ -11,7 +11,7 @@ namespace baton {
 
 void init_logging(std::string_view program, std::string_view level) {
   auto logger = spdlog::stderr_logger_mt(std::string(program));
-  logger->set_pattern(fmt::format("%H:%M:%S.%e {} %l: %v", program));
+  logger->set_pattern(fmt::format("%Y-%m-%dT%H:%M:%S.%e%z {} %l: %v", program));
   const char* from_environment = std::getenv("BATON_LOG");
   const std::string chosen = !level.empty()
                                  ? std::string(level)

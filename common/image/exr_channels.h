@@ -20,6 +20,7 @@ enum class ExrWindow : std::uint8_t { data, display, seen };
 /// What the header of a part says; of one that is not flat no channels.
 struct ExrPart {
   PartLayout layout;
+  PixelRect data, display;
   std::optional<Chromaticities> chromaticities;
 };
 /// The parts of an EXR file, one at least. Errors: those of read_exr.

@@ -11,6 +11,7 @@ namespace {
 /// What is read of a file, and what its header says of it.
 struct Chosen {
   ColorChoice choice;
+  PixelRect data, display;  ///< of its part
   std::optional<Chromaticities> chromaticities;
 };
 
@@ -35,7 +36,8 @@ Result<Chosen> choose(const std::filesystem::path& path, bool any) {
     choice->notes.push_back("chromaticities of 0 count as unknown");
     said.reset();
   }
-  return Chosen{std::move(*choice), said};
+  const ExrPart& part = parts[choice->part];
+  return Chosen{std::move(*choice), part.data, part.display, said};
 }
 
 Result<FilmTile> read_planes(const std::filesystem::path& path, const ColorChoice& choice,
@@ -58,8 +60,11 @@ Result<FilmTile> read_planes(const std::filesystem::path& path, const ColorChoic
 
 }  // namespace
 
-Result<ExrImage> read_exr_image(const std::filesystem::path& path, ExrWindow window, bool any) {
+Result<ExrImage> read_exr_image(const std::filesystem::path& path, ExrWindow window, bool any,
+                                const PixelLimit& limit) {
   BATON_ASSIGN(Chosen chosen, choose(path, any));
+  for (const PixelRect& taken : {chosen.data, chosen.display})
+    BATON_TRY(limit.check(taken.width(), taken.height(), path.string()));
   const ColorChoice& choice = chosen.choice;
   BATON_ASSIGN(const FilmTile film, read_planes(path, choice, window));
   ExrImage image{.width = film.rect.width(),

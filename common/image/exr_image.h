@@ -9,6 +9,7 @@
 #include "common/base/result.h"
 #include "common/image/color_space.h"
 #include "common/image/exr_channels.h"
+#include "common/image/pixel_limit.h"
 
 namespace baton {
 
@@ -29,9 +30,9 @@ struct ExrImage {
 
 /// Reads what color_choice.h chooses of the file's parts, layers and channels. any: where nothing
 /// has the name of a colour, its first channels. Errors: those of read_exr_channels, no colours,
-/// luminance and chroma in another part than the first.
+/// luminance and chroma in another part than the first, more pixels than `limit` has.
 Result<ExrImage> read_exr_image(const std::filesystem::path& path, ExrWindow window,
-                                bool any = false);
+                                bool any = false, const PixelLimit& limit = {});
 
 /// What its numbers are; Rec. 709 where the header says nothing or the picture is grey.
 Result<ImageColors> read_exr_image_colors(const std::filesystem::path& path);

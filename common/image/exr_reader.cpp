@@ -205,6 +205,8 @@ Result<std::vector<ExrPart>> read_exr_parts(const std::filesystem::path& path) {
           const Imf::Header& header = file.header(p);
           ExrPart& part = parts.emplace_back();
           part.layout.name = header.hasName() ? header.name() : "";
+          part.data = rect_of(header.dataWindow());
+          part.display = rect_of(header.displayWindow());
           const bool is_flat = !header.hasType() || Imf::isImage(header.type());
           if (is_flat) part.layout.channels = names_in(header);
           if (Imf::hasChromaticities(header))

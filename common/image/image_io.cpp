@@ -59,8 +59,9 @@ ImageColors colors_of(const ExrImage& exr) {
   return {.chromaticities = has_colors ? *exr.chromaticities : Chromaticities()};
 }
 
-Result<RgbImage> rgb_from_exr(const std::filesystem::path& path, ExrWindow window) {
-  BATON_ASSIGN(ExrImage exr, read_exr_image(path, window));
+Result<RgbImage> rgb_from_exr(const std::filesystem::path& path, ExrWindow window,
+                              const PixelLimit& limit) {
+  BATON_ASSIGN(ExrImage exr, read_exr_image(path, window, false, limit));
   RgbImage image{exr.width, exr.height, {}, std::move(exr.notes)};
   if (!sides_ok(image.width, image.height)) return side_error(path, image.width, image.height);
 
@@ -78,10 +79,11 @@ Result<RgbImage> rgb_from_exr(const std::filesystem::path& path, ExrWindow windo
   return converted(path, std::move(image), colors_of(exr));
 }
 
-Result<RgbImage> rgb_from_radiance(const std::filesystem::path& path) {
+Result<RgbImage> rgb_from_radiance(const std::filesystem::path& path, const PixelLimit& limit) {
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
   BATON_ASSIGN(const RadianceHeader header, read_radiance_header(bytes, path.string()));
   if (!sides_ok(header.width, header.height)) return side_error(path, header.width, header.height);
+  BATON_TRY(limit.check(header.width, header.height, path.string()));
   BATON_ASSIGN(RgbImage image, read_radiance_pixels(bytes, header, path.string()));
   image.notes = header.notes;
   return converted(path, std::move(image), header.colors);
@@ -93,13 +95,14 @@ std::uint8_t channel_to_srgb8(float linear) {
 
 }  // namespace
 
-Result<RgbImage> read_rgb_image(const std::filesystem::path& path, ExrWindow window) {
+Result<RgbImage> read_rgb_image(const std::filesystem::path& path, ExrWindow window,
+                                const PixelLimit& limit) {
   BATON_ASSIGN(const ImageFormat format, image_format(path));
   switch (format) {
     case ImageFormat::exr:
-      return rgb_from_exr(path, window);
+      return rgb_from_exr(path, window, limit);
     case ImageFormat::radiance:
-      return rgb_from_radiance(path);
+      return rgb_from_radiance(path, limit);
     case ImageFormat::unknown:
       break;
   }

@@ -13,6 +13,7 @@
 #include "common/image/color_space.h"
 #include "common/image/exr_channels.h"
 #include "common/image/film_tile.h"
+#include "common/image/pixel_limit.h"
 
 namespace baton {
 
@@ -29,9 +30,10 @@ struct RgbImage {
 /// Reads an EXR or Radiance HDR image as float32 RGB (grey is spread to three channels, alpha
 /// dropped), in linear Rec. 709 as the header says what its numbers are (read_image_colors).
 /// window: of an EXR file. Errors name the file: missing, not an image, truncated, sides past
-/// limits::kMaxEnvironmentSide, no colours (color_choice.h).
+/// limits::kMaxEnvironmentSide, more pixels than `limit` has, no colours (color_choice.h).
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path,
-                                ExrWindow window = ExrWindow::display);
+                                ExrWindow window = ExrWindow::display,
+                                const PixelLimit& limit = {});
 /// What read_rgb_image converts from: `chromaticities` of an EXR file; PRIMARIES, EXPOSURE and
 /// COLORCORR of a Radiance one. Of an image of one channel, only factors.
 Result<ImageColors> read_image_colors(const std::filesystem::path& path);

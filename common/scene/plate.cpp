@@ -15,9 +15,9 @@ namespace baton {
 namespace {
 
 /// Any picture, linear.
-Result<RgbImage> read_plate_image(const std::string& path) {
-  if (is_radiance_file(path)) return read_rgb_image(path);
-  BATON_ASSIGN(const Image image, read_image(path));
+Result<RgbImage> read_plate_image(const std::string& path, const PixelLimit& limit) {
+  if (is_radiance_file(path)) return read_rgb_image(path, ExrWindow::display, limit);
+  BATON_ASSIGN(const Image image, read_image(path, limit));
   return RgbImage{image.width, image.height, linear_colors(image), image.notes};
 }
 
@@ -38,9 +38,9 @@ std::uint64_t repair(RgbImage& image) {
 
 }  // namespace
 
-Result<Plate> load_plate(const JobSpec& job, FrameNumber frame) {
+Result<Plate> load_plate(const JobSpec& job, FrameNumber frame, const PixelLimit& limit) {
   const std::string path = file_at(*job.output.plate, frame);
-  BATON_ASSIGN(RgbImage plate, read_plate_image(path));
+  BATON_ASSIGN(RgbImage plate, read_plate_image(path, limit));
   const std::uint64_t repaired = repair(plate);
 
   // Its height at the picture's width, to a pixel.

@@ -21,8 +21,8 @@ struct Plate {
 /// The plate of a frame of a job with plates, as large as the whole picture of the job: each pixel
 /// is the mean of the file over it. Linear Rec. 709; integers are taken as sRGB, alpha is dropped.
 /// What is NaN or infinite becomes 0, what is below zero stays. Errors name the file: missing, not
-/// an image, smaller than the picture or of another shape.
-Result<Plate> load_plate(const JobSpec& job, FrameNumber frame);
+/// an image, smaller than the picture or of another shape, larger than `limit`.
+Result<Plate> load_plate(const JobSpec& job, FrameNumber frame, const PixelLimit& limit = {});
 
 /// Whether a plate is an EXR or Radiance HDR file, whose header may say what its numbers are
 /// (read_image_colors); by its name.

@@ -290,7 +290,7 @@ MeshVertices vertices_of(const Scene& scene, const MeshShapes& shapes, std::uint
   return {rest.positions, rest.normals, rest.tangents};
 }
 
-Result<Scene> load_scene(const JobSpec& job, FilesBeside beside) {
+Result<Scene> load_scene(const JobSpec& job, FilesBeside beside, std::uint64_t max_texture_bytes) {
   Scene scene;
   Faults faults;
 
@@ -301,7 +301,7 @@ Result<Scene> load_scene(const JobSpec& job, FilesBeside beside) {
     for (const FileSpec& file : job.scene.files) listed->insert(file.path);
   }
   gltf::FileCache files(std::move(listed));
-  DetailLoader details(files, job.scene.files);
+  DetailLoader details(files, job.scene.files, max_texture_bytes);
   NameIndex materials;
   std::vector<const MaterialSpec*> material_specs;
   for (const auto& [name, material] : job.scene.materials) {

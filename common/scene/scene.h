@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/limits.h"
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
 #include "common/scene/material/material.h"
@@ -65,6 +66,8 @@ enum class FilesBeside {
 };
 
 /// Loads every mesh and resolves every name. The ground is a two-triangle mesh of its own.
-Result<Scene> load_scene(const JobSpec& job, FilesBeside beside = FilesBeside::any);
+/// max_texture_bytes: no more textures are read than that.
+Result<Scene> load_scene(const JobSpec& job, FilesBeside beside = FilesBeside::any,
+                         std::uint64_t max_texture_bytes = limits::kMaxTextureBytes);
 
 }  // namespace baton

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "common/base/exit_codes.h"
+#include "common/base/settings.h"
 
 namespace baton {
 
@@ -20,6 +21,9 @@ void add_state_command(CLI::App& app, ExitCode& code);
 void add_top_command(CLI::App& app, ExitCode& code);
 void add_view_command(CLI::App& app, ExitCode& code);
 void add_worker_command(CLI::App& app, ExitCode& code);
+
+/// settings: what take_settings() will have given when the command runs.
+void add_config_command(CLI::App& app, const std::vector<Setting>& settings);
 
 /// Prints the error of a command, if it has one, and gives its exit code.
 ExitCode finish(const Result<ExitCode>& outcome);

@@ -6,8 +6,10 @@
 #include <vector>
 
 #include "common/base/build.h"
+#include "common/base/command_pages.h"
 #include "common/base/log.h"
 #include "common/base/option_values.h"
+#include "common/base/settings.h"
 #include "common/base/suggest.h"
 #include "jobs/cli/commands.h"
 
@@ -35,6 +37,7 @@ constexpr const char* kFooter = R"(Examples:
   baton worker list
   baton top                          jobs and workers of the farm, shown anew
   baton farm slurm job.json --nodes 1-8 --time 2:00:00
+  baton config                       what the environment and files say of options
   baton key create keys              keys for a farm of several machines
   baton chart study.json             error against time of several methods, as charts
   baton compare a.json b.json        two ways to render the same frames, side by side
@@ -91,7 +94,6 @@ std::string unknown_option(const CLI::App& app, int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  baton::init_logging("baton");
   CLI::App app("Renders animations lit by changing HDR environments.", "baton");
   app.set_version_flag("--version", baton::build_identity());
   app.require_subcommand(1);
@@ -114,6 +116,15 @@ int main(int argc, char** argv) {
   baton::add_compare_command(app, code);
   baton::add_view_command(app, code);
   baton::add_movie_command(app, code);
+  std::vector<baton::Setting> settings;
+  baton::add_config_command(app, settings);
+  baton::add_page_options<CLI::Success>(app);
+  if (auto taken = baton::take_settings(baton::describe_command(app))) {
+    settings = std::move(*taken);
+  } else {
+    return static_cast<int>(baton::finish(taken.error()));
+  }
+  baton::init_logging("baton");
   for (const auto& look : {unknown_command, unknown_option}) {
     if (const std::string fault = look(app, argc, argv); !fault.empty()) {
       fmt::print(stderr, "{}\n", fault);

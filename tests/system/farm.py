@@ -29,6 +29,7 @@ DEADLINE_S = 120 * PATIENCE
 # Where the programs look for keys that a coordinator has made for itself: not among those of whoever runs the tests.
 STATE_FOLDER = tempfile.mkdtemp(prefix="baton-state-")
 os.environ["XDG_STATE_HOME"] = STATE_FOLDER
+os.environ["BATON_CONFIG_DIR"] = ""  # nor their settings
 atexit.register(shutil.rmtree, STATE_FOLDER, ignore_errors=True)
 
 OK, FAILED, USAGE, BAD_INPUT, UNAVAILABLE, IO = 0, 2, 64, 65, 69, 74

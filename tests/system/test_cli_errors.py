@@ -42,7 +42,8 @@ class Desk:
         grey_map(folder / "sky.hdr", 4, 2)
 
     def baton(self, *arguments, **variables):
-        environment = {k: v for k, v in os.environ.items() if not k.startswith("BATON_")} | variables
+        own = {k: v for k, v in os.environ.items() if not k.startswith("BATON_")}
+        environment = own | {"BATON_CONFIG_DIR": ""} | variables
         return subprocess.run([self.program, *map(str, arguments)], cwd=self.folder, env=environment, capture_output=True,
                               text=True, timeout=DEADLINE_S, check=False)
 

@@ -55,7 +55,7 @@ def run_command(command, programs, folder):
 
 def shown(output):
     """What the page shows of what is said: no progress, no news, no times of a log."""
-    lines = [re.sub(r"^\d\d:\d\d:\d\d\.\d+ baton ", "", line) for line in output.splitlines()]
+    lines = [re.sub(r"^\d{4}-\d\d-\d\dT[\d:.+-]+ baton ", "", line) for line in output.splitlines()]
     return [line for line in lines if line and not re.match(r"frames \d+/|info: ", line)]
 
 

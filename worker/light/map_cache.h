@@ -23,10 +23,14 @@ class MapCache {
   using MapPtr = std::shared_ptr<const EnvironmentMap>;
 
   using Reader = std::function<Result<RgbImage>(const std::string& path)>;
+  /// Of files of at most so many pixels.
+  static Reader read_within(PixelLimit limit) {
+    return [limit = std::move(limit)](const std::string& path) {
+      return read_rgb_image(path, ExrWindow::display, limit);
+    };
+  }
 
-  explicit MapCache(
-      const MemorySharePtr& share,
-      Reader read = [](const std::string& path) { return read_rgb_image(path); })
+  explicit MapCache(const MemorySharePtr& share, Reader read = read_within({}))
       : read_(std::move(read)),
         maps_(share, [](const EnvironmentMap& map) { return map.size_bytes(); }) {}
 
@@ -37,7 +41,7 @@ class MapCache {
   }
   /// The map of a file with the size and table that `environment` and the other arguments, those
   /// of EnvironmentMap, ask for. A disk that is away for a moment is waited for. Error: a map that
-  /// cannot be read, or has changed.
+  /// cannot be read, is too large, or has changed.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
                      const HiddenCone& hidden = {}, float capped_share = 0);
   /// What is known of a map that was got with this scale; nothing of a map that was not.

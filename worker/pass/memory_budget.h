@@ -5,6 +5,7 @@
 
 #include "common/base/machine_memory.h"
 #include "common/base/memory_share.h"
+#include "common/image/pixel_limit.h"
 
 namespace baton {
 
@@ -31,6 +32,11 @@ struct MemoryBudget {
             .light = share(1),
             .surfaces = share(2),
             .states = share(4)};
+  }
+  /// Maps and plates, which are read whole: what a decoder, its colours and a map that is mixed
+  /// take of each pixel, as measured with a Radiance map of 16384 x 8192.
+  PixelLimit pictures() const {
+    return PixelLimit::in_memory(total_bytes, 44, "the worker's (--memory)");
   }
   static MemoryBudget of_machine() { return of(default_memory_bytes()); }
 };

@@ -12,7 +12,7 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
                                                                std::uint64_t max_scene_bytes,
                                                                FilesBeside beside) {
   auto assets = std::make_shared<SharedAssets>();
-  BATON_ASSIGN(assets->scene, load_scene(job, beside));
+  BATON_ASSIGN(assets->scene, load_scene(job, beside, max_scene_bytes));
   const std::uint64_t scene_bytes = assets->scene.size_bytes();
   const std::uint64_t room = max_scene_bytes - std::min(max_scene_bytes, scene_bytes);
   Result<std::unique_ptr<Accel>> accel = Accel::build(assets->scene, {.max_bytes = room});
@@ -26,7 +26,7 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
   }
   if (!accel) return accel.error();
   assets->accel = std::move(accel).value();
-  assets->maps = std::make_shared<MapCache>(memory.maps);
+  assets->maps = std::make_shared<MapCache>(memory.maps, MapCache::read_within(memory.pictures()));
   return std::shared_ptr<const SharedAssets>(std::move(assets));
 }
 

@@ -228,7 +228,7 @@ Result<TaskResult> execute_second_pass(const LoadedJob& loaded, const PatientSto
 
 /// The plate of a frame, which must still be the job's.
 Result<Plate> read_plate(const LoadedJob& loaded, FrameNumber number) {
-  BATON_ASSIGN(Plate plate, load_plate(loaded.context->job, number));
+  BATON_ASSIGN(Plate plate, load_plate(loaded.context->job, number, loaded.plates));
   BATON_TRY(verify_asset(loaded.assets, file_at(*loaded.context->job.output.plate, number)));
   return plate;
 }

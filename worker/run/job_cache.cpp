@@ -105,7 +105,8 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
                                                       .picture = parsed.picture,
                                                       .context = nullptr,
                                                       .token = document.token,
-                                                      .id = document.id});
+                                                      .id = document.id,
+                                                      .plates = machine.memory.pictures()});
   loaded->job.output.directory = here.job.output.directory;
   BATON_TRY(check_roots(here, machine.roots));
   if (const Status seen = expect_output_folder(*loaded); !seen) {

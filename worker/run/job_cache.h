@@ -40,6 +40,7 @@ struct LoadedJob {
   JobId id = {};           ///< of which job it is a version
   /// Files that the job reads, where this machine has them.
   std::vector<KnownAsset> assets = {};
+  PixelLimit plates = {};  ///< MemoryBudget::pictures
 };
 
 using LoadedJobPtr = std::shared_ptr<const LoadedJob>;

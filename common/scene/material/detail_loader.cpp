@@ -57,8 +57,9 @@ bool has_detail(const MaterialSpec& spec) {
           SurfaceDetail{spec}.is_cut_out());
 }
 
-DetailLoader::DetailLoader(gltf::FileCache& files, const std::vector<FileSpec>& listed)
-    : files_(files) {
+DetailLoader::DetailLoader(gltf::FileCache& files, const std::vector<FileSpec>& listed,
+                           std::uint64_t max_bytes)
+    : files_(files), max_bytes_(std::min(max_bytes, limits::kMaxTextureBytes)) {
   for (const FileSpec& file : listed) listed_.insert(file.path);
 }
 
@@ -145,15 +146,17 @@ Result<DetailLoader::TexturePtr> DetailLoader::load_texture(const TextureSpec& s
   for (const std::string& note : repair_notes(texture->repairs()))
     notes_.insert(fmt::format("{}: {}", name_of(spec), note));
   size_bytes_ += texture->size_bytes();
-  if (size_bytes_ > limits::kMaxTextureBytes)
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: the scene's textures take more than {} bytes", name_of(spec),
-                             limits::kMaxTextureBytes)};
+  if (size_bytes_ > max_bytes_)
+    return Error{ErrorKind::bad_input, fmt::format("{}: the scene's textures take more than {} MiB",
+                                                   name_of(spec), max_bytes_ >> 20)};
   return texture;
 }
 
 Result<Image> DetailLoader::read(const TextureSpec& spec) {
-  if (spec.image < 0) return read_image(spec.file);
+  // Floats of four channels, until it is a texture.
+  const PixelLimit limit{static_cast<std::int64_t>(max_bytes_ / (4 * sizeof(float))),
+                         fmt::format(", since textures may take {} MiB", max_bytes_ >> 20)};
+  if (spec.image < 0) return read_image(spec.file, limit);
   BATON_ASSIGN(const auto document, files_.get(spec.file));
   const auto index = static_cast<std::size_t>(spec.image);
   if (index >= document->images.size())
@@ -162,9 +165,9 @@ Result<Image> DetailLoader::read(const TextureSpec& spec) {
   if (const std::string& file = document->images[index].file; !file.empty()) {
     if (files_.listed() != nullptr && !files_.listed()->contains(file))
       return gltf::not_listed(spec.file, file);
-    return read_image(file);
+    return read_image(file, limit);
   }
-  return read_image(document->bytes_of_image(index), name_of(spec));
+  return read_image(document->bytes_of_image(index), name_of(spec), limit);
 }
 
 std::optional<MissingUvs> missing_uvs(const SurfaceDetail& detail, const TriangleMesh& mesh) {

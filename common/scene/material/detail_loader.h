@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -18,11 +19,13 @@ bool has_detail(const MaterialSpec& spec);
 /// Loads the textures of materials, each image once for each use.
 class DetailLoader {
  public:
-  /// files: must outlive the object. listed: the tiles of textures are among them.
-  DetailLoader(gltf::FileCache& files, const std::vector<FileSpec>& listed);
+  /// files: must outlive the object. listed: the tiles of textures are among them. max_bytes: that
+  /// all textures together may take.
+  DetailLoader(gltf::FileCache& files, const std::vector<FileSpec>& listed,
+               std::uint64_t max_bytes);
 
   /// What a material of numbers has beside them; null: nothing. Errors name the file: no image,
-  /// not there, together larger than kMaxTextureBytes.
+  /// not there, together larger than max_bytes, or one while it is read.
   Result<std::shared_ptr<const SurfaceDetail>> load(const MaterialSpec& spec);
 
  private:
@@ -36,6 +39,7 @@ class DetailLoader {
   gltf::FileCache& files_;
   std::set<std::string> listed_;
   std::map<std::tuple<std::string, int, TextureUse>, Result<TexturePtr>> textures_;
+  const std::uint64_t max_bytes_;
   std::uint64_t size_bytes_ = 0;
   std::set<std::string> notes_;  ///< of images of the material that is loaded
 };

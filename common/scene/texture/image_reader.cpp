@@ -44,24 +44,29 @@ const Result<Reader>& reader() {
   return loaded;
 }
 
-/// What is wrong with the size of an image; empty: nothing.
-std::string fault_of(std::int32_t width, std::int32_t height) {
+Status check_size(std::int64_t width, std::int64_t height, const PixelLimit& limit,
+                  const std::string& name) {
   const auto max = limits::kMaxTextureSide;
   if (width < 1 || height < 1 || width > max || height > max)
-    return fmt::format("expected an image of 1 to {} pixels a side, got {} x {}", max, width,
-                       height);
-  return {};
+    return bad_image(name, fmt::format("expected an image of 1 to {} pixels a side, got {} x {}",
+                                       max, width, height));
+  return limit.check(width, height, name);
 }
 
 /// Takes what the reader hands over.
 struct Taker {
+  const PixelLimit& limit;
+  const std::string& name;
   Image image;
-  std::string fault;
+  Error fault;
 
   static float* accept(void* self, const BatonImageLayout* layout) {
     auto& taker = *static_cast<Taker*>(self);
-    taker.fault = fault_of(layout->width, layout->height);
-    if (!taker.fault.empty()) return nullptr;
+    const Status fits = check_size(layout->width, layout->height, taker.limit, taker.name);
+    if (!fits) {
+      taker.fault = fits.error();
+      return nullptr;
+    }
     taker.image = {.width = layout->width,
                    .height = layout->height,
                    .channels = layout->channels,
@@ -75,23 +80,24 @@ struct Taker {
     return taker.image.samples.data();
   }
   static void fail(void* self, const char* message) {
-    std::string& text = static_cast<Taker*>(self)->fault;
-    text = "not an image: ";
+    auto& taker = *static_cast<Taker*>(self);
+    std::string text = "not an image: ";
     // Messages have lines.
     for (const char* c = message; *c != '\0'; ++c)
       text += std::iscntrl(static_cast<unsigned char>(*c)) != 0 ? ' ' : *c;
+    taker.fault = bad_image(taker.name, text);
   }
 };
 
 Result<Image> read(const std::string& file_name, std::optional<ByteView> bytes,
-                   const std::string& name) {
+                   const std::string& name, const PixelLimit& limit) {
   const Result<Reader>& loaded = reader();
   if (!loaded) return loaded.error();
-  Taker taker;
+  Taker taker{.limit = limit, .name = name, .image = {}, .fault = {}};
   const BatonImageSink sink{&taker, &Taker::accept, &Taker::fail};
   const bool done = loaded->read(file_name.c_str(), bytes ? bytes->data() : nullptr,
                                  bytes ? bytes->size() : 0, &sink) != 0;
-  if (!done) return bad_image(name, taker.fault);
+  if (!done) return taker.fault;
   return std::move(taker.image);
 }
 
@@ -118,9 +124,9 @@ Result<FirstBytes> first_bytes(const std::string& path) {
 
 /// OpenImageIO opens the file itself, and takes an error of the moment for a broken one: what it
 /// does not read it looks at again.
-Result<Image> read_by_name(const std::string& path) {
-  Result<Image> image = read(path, std::nullopt, path);
-  return image ? std::move(image) : read(path, std::nullopt, path);
+Result<Image> read_by_name(const std::string& path, const PixelLimit& limit) {
+  Result<Image> image = read(path, std::nullopt, path, limit);
+  return image ? std::move(image) : read(path, std::nullopt, path, limit);
 }
 
 bool is_exr(const FirstBytes& start) {
@@ -133,8 +139,11 @@ Result<Image> with_notes(Result<Image> image, ByteView bytes) {
   return image;
 }
 
-Result<Image> read_exr_texture(const std::string& path) {
-  BATON_ASSIGN(ExrImage picture, read_exr_image(path, ExrWindow::display, true));
+Result<Image> read_exr_texture(const std::string& path, const PixelLimit& limit) {
+  constexpr std::int64_t kMost = std::int64_t{limits::kMaxTextureSide} * limits::kMaxTextureSide;
+  const PixelLimit sides{kMost, fmt::format(", {} a side", limits::kMaxTextureSide)};
+  BATON_ASSIGN(ExrImage picture,
+               read_exr_image(path, ExrWindow::display, true, limit.most < kMost ? limit : sides));
   Image image{.width = picture.width,
               .height = picture.height,
               .channels = picture.channels,
@@ -142,8 +151,7 @@ Result<Image> read_exr_texture(const std::string& path) {
               .has_alpha = picture.has_alpha,
               .is_associated = picture.has_alpha,
               .notes = std::move(picture.notes)};
-  if (const std::string fault = fault_of(image.width, image.height); !fault.empty())
-    return bad_image(path, fault);
+  BATON_TRY(check_size(image.width, image.height, limit, path));
   if (const auto& c = picture.chromaticities)
     image.chromaticities = {c->red[0],  c->red[1],  c->green[0], c->green[1],
                             c->blue[0], c->blue[1], c->white[0], c->white[1]};
@@ -152,20 +160,20 @@ Result<Image> read_exr_texture(const std::string& path) {
 
 }  // namespace
 
-Result<Image> read_image(const std::string& path) {
+Result<Image> read_image(const std::string& path, const PixelLimit& limit) {
   BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
   if (!stamp) return bad_image(path, "missing: expected an image file");
   BATON_ASSIGN(const FirstBytes start, first_bytes(path));
-  if (is_exr(start)) return read_exr_texture(path);
-  if (!is_jpeg(start)) return read_by_name(path);
+  if (is_exr(start)) return read_exr_texture(path, limit);
+  if (!is_jpeg(start)) return read_by_name(path, limit);
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
-  return with_notes(read_by_name(path), bytes);
+  return with_notes(read_by_name(path, limit), bytes);
 }
 
-Result<Image> read_image(ByteView bytes, const std::string& name) {
+Result<Image> read_image(ByteView bytes, const std::string& name, const PixelLimit& limit) {
   const std::string file_name = name_by_content(bytes);
   if (file_name.empty()) return bad_image(name, "not an image: expected PNG, JPEG or WebP");
-  Result<Image> image = read(file_name, bytes, name);
+  Result<Image> image = read(file_name, bytes, name, limit);
   return is_jpeg(bytes) ? with_notes(std::move(image), bytes) : std::move(image);
 }
 

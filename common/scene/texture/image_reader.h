@@ -8,6 +8,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/result.h"
+#include "common/image/pixel_limit.h"
 
 namespace baton {
 
@@ -31,9 +32,9 @@ struct Image {
 /// but EXR is read: it and what it brings take a quarter of a second and 40 MB. Alpha is what the
 /// file calls so; of an EXR file the display window of what color_choice.h says; of several
 /// pictures in another file the first. Errors name the file: missing, not an image, more than
-/// kMaxTextureSide pixels a side.
-Result<Image> read_image(const std::string& path);
+/// kMaxTextureSide pixels a side, or than `limit` has in all.
+Result<Image> read_image(const std::string& path, const PixelLimit& limit = {});
 /// The same of a file in memory; `name` goes first in every error.
-Result<Image> read_image(ByteView bytes, const std::string& name);
+Result<Image> read_image(ByteView bytes, const std::string& name, const PixelLimit& limit = {});
 
 }  // namespace baton

@@ -35,7 +35,7 @@ struct AssetReport {
 };
 
 /// Loads everything that the job names. One error lists every fault: files that cannot be loaded,
-/// maps that are to be mixed but differ in size.
-Result<AssetReport> load_assets(const JobSpec& job);
+/// maps that are to be mixed but differ in size, what does not fit into so much memory.
+Result<AssetReport> load_assets(const JobSpec& job, std::uint64_t memory_bytes);
 
 }  // namespace baton

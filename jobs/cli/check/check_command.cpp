@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <tuple>
 
+#include "common/base/machine_memory.h"
 #include "common/job/motion.h"
 #include "common/job/plan/estimate.h"
 #include "common/job/plan/sequence.h"
@@ -239,7 +240,8 @@ Result<ExitCode> run_check(const CheckOptions& options) {
   std::vector<std::string> left_out;
   const Result<JobSpec> settled = settle_motion(wanted, &left_out);
   const JobSpec& job = settled ? *settled : wanted;
-  BATON_ASSIGN(const AssetReport assets, load_assets(job));  // lists the faults of all files
+  BATON_ASSIGN(const AssetReport assets,
+               load_assets(job, default_memory_bytes()));  // lists the faults of all files
   if (!settled) return settled.error();
   std::vector<JobSetting> settings;
   if (options.explain) {

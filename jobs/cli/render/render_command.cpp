@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "common/base/machine_memory.h"
 #include "jobs/cli/check/asset_report.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
@@ -13,9 +14,10 @@ namespace baton {
 namespace {
 
 /// Says how the job ended; one that failed because its files cannot be loaded is bad input.
-ExitCode exit_code_of(const JobSpec& job, JobStatus status) {
+ExitCode exit_code_of(const JobSpec& job, JobStatus status, std::uint64_t memory_mib) {
   if (status != JobStatus::failed) return exit_code_of_stopped(status);
-  const Result<AssetReport> assets = load_assets(job);
+  const Result<AssetReport> assets =
+      load_assets(job, memory_mib > 0 ? memory_mib << 20 : default_memory_bytes());
   return assets ? ExitCode::failed : exit_code_of(assets.error().kind);
 }
 
@@ -42,7 +44,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   }
   if (!status) spdlog::info("stopping; finished work is kept");
   session.stop();
-  if (status) return exit_code_of(job, *status);
+  if (status) return exit_code_of(job, *status, options.memory_mib);
 
   std::string place = options.work_directory.empty() ? "" : " --work-dir " + options.work_directory;
   if (options.from_frame) place += fmt::format(" --from-frame {}", *options.from_frame);

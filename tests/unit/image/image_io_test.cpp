@@ -252,6 +252,28 @@ TEST_F(ImageIoTest, HugeSidesAreRefusedBeforeReading) {
               HasSubstr("40000 x 40000 pixels, expected 1 to 32768 a side"));
 }
 
+// By the header: of the first file there is nothing else.
+TEST_F(ImageIoTest, MorePixelsThanThereIsMemoryForAreRefusedBeforeReading) {
+  ByteWriter writer;
+  writer.put_raw(as_bytes_view("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n"));
+  const PixelLimit limit{20'000'000, ", of 800 MiB"};
+  EXPECT_THAT(
+      read_rgb_image(write("huge.hdr", writer.bytes()), ExrWindow::display, limit).error().message,
+      HasSubstr("16384 x 8192 pixels, expected at most 20.0 million, of 800 MiB"));
+  const fs::path exr = folder_ / "a.exr";
+  for (const bool is_framed : {false, true}) {
+    const std::optional<PixelRect> shown =
+        is_framed ? std::optional(PixelRect{0, 0, 200, 10}) : std::nullopt;
+    ASSERT_TRUE(write_exr(exr, picture({"R", "G", "B"}), {.display_window = shown}));
+    const PixelLimit most{is_framed ? 1999 : 776};
+    const Result<RgbImage> image = read_rgb_image(exr, ExrWindow::display, most);
+    ASSERT_FALSE(image.ok());
+    EXPECT_EQ(image.error().kind, ErrorKind::bad_input);
+    EXPECT_THAT(image.error().message, HasSubstr(is_framed ? "200 x 10 pixels" : "37 x 21 pixels"));
+    EXPECT_TRUE(read_rgb_image(exr, ExrWindow::display, {most.most + 1}));
+  }
+}
+
 TEST_F(ImageIoTest, PngIsWrittenWholeAndDeterministic) {
   const RgbImage image{
       2, 2, {0, 0.5f, 1, 2, -1, std::nanf(""), 0.1f, 0.2f, 0.3f, 0.001f, 0.9f, 0.0f}};

@@ -298,6 +298,23 @@ TEST(MapCache, AMapIsReadOncePerTable) {
   EXPECT_FALSE(maps.get("nowhere.exr", job.environment, false));
 }
 
+// By its header, before anything is taken for it.
+TEST(MapCache, AMapThatDoesNotFitIsRefused) {
+  const std::string path = testing::TempDir() + "huge.hdr";
+  ASSERT_TRUE(write_file_atomic(path, as_bytes_view("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n"
+                                                    "-Y 8192 +X 16384\n"))
+                  .ok());
+  const MemoryBudget memory = MemoryBudget::of(std::uint64_t{800} << 20);
+  MapCache maps(memory.maps, MapCache::read_within(memory.pictures()));
+  const auto map = maps.get(path, {}, false);
+  ASSERT_FALSE(map.ok());
+  EXPECT_EQ(map.error().kind, ErrorKind::bad_input);
+  EXPECT_EQ(map.error().message,
+            path +
+                ": 16384 x 8192 pixels, expected at most 19.1 million, 44 bytes each, of the "
+                "worker's 800 MiB (--memory)");
+}
+
 // An error of the moment is waited for; what is wrong with a map stays wrong.
 TEST(MapCache, AMapThatCannotBeReadIsReadAgain) {
   const JobSpec job = test::box_job();

@@ -75,6 +75,25 @@ TEST_F(PlateFile, IsTheDisplayWindowOfAnExrFile) {
   EXPECT_THAT(load_plate(job_, FrameNumber(1)).value().picture.rgb, ElementsAre(0, 0, 0, 5, 6, 7));
 }
 
+// By the header, whatever reads the format.
+TEST_F(PlateFile, MorePixelsThanThereIsMemoryForAreRefused) {
+  const std::string tiff = test::write_tiff("many.tif", 4, 2, test::TiffExtra::associated,
+                                            std::vector<float>(4 * 8, 0.5f));
+  const fs::path exr = fs::path(testing::TempDir()) / "many.exr";
+  ASSERT_TRUE(
+      write_exr(exr, FilmTile{{0, 0, 4, 2}, {"R", "G", "B"}, std::vector<float>(3 * 8)}, {}));
+  job_.image.width = 4;
+  job_.image.height = 2;
+  for (const std::string& file : {tiff, exr.string()}) {
+    job_.output.plate = FileSequence{.files = file};
+    EXPECT_TRUE(load_plate(job_, FrameNumber(1), {8}));
+    const auto plate = load_plate(job_, FrameNumber(1), {7, ", of 1 MiB"});
+    ASSERT_FALSE(plate.ok());
+    EXPECT_THAT(plate.error().message,
+                HasSubstr(file + ": 4 x 2 pixels, expected at most 0.0 million, of 1 MiB"));
+  }
+}
+
 TEST_F(PlateFile, FaultsNameTheFileAndTheSize) {
   const fs::path folder = testing::TempDir();
   const auto fault = [&](int width, int height) {
