@@ -8,11 +8,14 @@ namespace baton {
 
 /// An option or a positional of a command line, as people are told of it.
 struct OptionInfo {
-  std::vector<std::string> names;  ///< "--frames", "-l"; of a positional its name
+  /// "--frames", "-l"; of a positional its name.
+  std::vector<std::string> names;
   bool is_positional = false;
-  std::string value;  ///< what it takes: "TEXT", "INT"; empty: nothing
+  /// What it takes: "TEXT", "INT"; empty: nothing.
+  std::string value;
   std::string about;
-  std::string preset;                ///< the default where it is shown; empty: none
+  /// The default where it is shown; empty: none.
+  std::string preset;
   std::string variable;              ///< of the environment; empty: none
   std::vector<std::string> choices;  ///< empty: any value
   bool is_required = false;

@@ -7,9 +7,6 @@
 #include <cctype>
 #include <cstdio>
 #include <map>
-
-#include "common/base/settings.h"
-
 namespace baton {
 namespace {
 
@@ -234,8 +231,10 @@ std::string manual_page(const CommandInfo& program) {
   for (const auto& [variable, about] : variables)
     page += fmt::format(".TP\n.B {}\n{}\n", roff(variable), roff(about));
   page += fmt::format(
-      ".SH FILES\n{}: lines NAME=VALUE, with names of the environment; the last one goes first.\n",
-      roff(fmt::format("{}", fmt::join(settings_files(program.name), ", "))));
+      ".SH FILES\n~/.config/baton/{0}.conf goes before /etc/baton/{0}.conf: lines NAME=VALUE, with "
+      "names "
+      "of the environment.\n",
+      roff(program.name));
   return page;
 }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -31,10 +30,15 @@ Result<std::optional<FileStamp>> stamp_of(const std::filesystem::path& path) {
   const auto ns_of = [](const timespec& time) {
     return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
   };
+  // Bytes that are older than how the file is kept: the usual case, in which the latter says all.
+  // Otherwise a clock was ahead, or the file system has no such time, and both count.
+  const std::int64_t written = ns_of(status.st_mtim), kept = ns_of(status.st_ctim);
+  const std::uint64_t both =
+      static_cast<std::uint64_t>(written) * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(kept);
   return std::optional(
       FileStamp{.size_bytes = static_cast<std::uint64_t>(status.st_size),
                 .inode = status.st_ino,
-                .time_ns = std::max(ns_of(status.st_mtim), ns_of(status.st_ctim))});
+                .time_ns = written > kept ? static_cast<std::int64_t>(both) : kept});
 }
 
 }  // namespace baton

@@ -11,8 +11,9 @@ namespace baton {
 /// A variable of the environment that stands in for options, and where its value comes from.
 struct Setting {
   std::string name;
-  std::string value;                 ///< empty: none
-  std::string from;                  ///< "environment", "FILE:LINE"; empty: it is not set
+  std::string value;  ///< empty: none
+  /// "environment", "FILE:LINE"; empty: it is not set.
+  std::string from;
   std::vector<std::string> options;  ///< "--key", with the commands that have it
 };
 

@@ -42,6 +42,7 @@ class BytesStream : public Imf::IStream {
 }  // namespace
 
 std::optional<std::string> writer_of_frame(const std::string& name, const Bytes& exr) {
+  if (exceeds_reader(exr)) return std::string();
   if (!check_exr_attributes(name, exr)) return std::nullopt;
   try {
     // True: something is wrong with it.

@@ -1,5 +1,6 @@
 #include "common/image/exr_header.h"
 
+#include <OpenEXR/ImfCompression.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -82,8 +83,11 @@ bool is_fair_box(std::istream& file) {
 }
 
 /// A header is attributes up to an empty name: name, type, both ended by a zero, a size and so many
-/// bytes. A file of several parts has several headers, and an empty one behind them.
-Status check_attributes(std::istream& file, std::uint64_t file_bytes, const std::string& path) {
+/// bytes. A file of several parts has several headers, and an empty one behind them. visit(name):
+/// at the value of each; an error of it ends this.
+template <class Visit>
+Status for_each_attribute(std::istream& file, std::uint64_t file_bytes, const std::string& path,
+                          const Visit& visit) {
   read_u32(file);  // the magic number is for OpenEXR to check
   const bool multi_part = (read_u32(file) & kMultiPart) != 0;
   std::string name, type;
@@ -93,11 +97,7 @@ Status check_attributes(std::istream& file, std::uint64_t file_bytes, const std:
       is_empty = false;
       std::getline(file, type, '\0');
       const std::uint32_t size = read_u32(file);
-      if (name == "dataWindow" && !is_fair_box(file)) {
-        return Error{ErrorKind::bad_input,
-                     fmt::format("{}: dataWindow: expected sides of 1 to {} pixels", path,
-                                 limits::kMaxImageSide)};
-      }
+      BATON_TRY(visit(name));
       if (!file || !skip_value(file, type, size, file_bytes)) {
         return Error{
             ErrorKind::bad_input,
@@ -107,6 +107,15 @@ Status check_attributes(std::istream& file, std::uint64_t file_bytes, const std:
     }
     if (is_empty || !multi_part || !file) return {};
   }
+}
+
+Status check_attributes(std::istream& file, std::uint64_t file_bytes, const std::string& path) {
+  return for_each_attribute(file, file_bytes, path, [&](const std::string& name) -> Status {
+    if (name != "dataWindow" || is_fair_box(file)) return {};
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: dataWindow: expected sides of 1 to {} pixels", path,
+                             limits::kMaxImageSide)};
+  });
 }
 
 }  // namespace
@@ -121,6 +130,22 @@ Status check_exr_attributes(const std::filesystem::path& path) {
 Status check_exr_attributes(const std::string& name, ByteView exr) {
   std::istringstream file(std::string(reinterpret_cast<const char*>(exr.data()), exr.size()));
   return check_attributes(file, exr.size(), name);
+}
+
+bool exceeds_reader(ByteView exr) {
+  constexpr std::string_view kMagic = "\x76\x2f\x31\x01";
+  if (!std::ranges::equal(exr.first(std::min(exr.size(), kMagic.size())), as_bytes_view(kMagic)))
+    return false;
+  std::istringstream file(std::string(reinterpret_cast<const char*>(exr.data()), exr.size()));
+  bool exceeds = false, is_ours = false;
+  const Status whole =
+      for_each_attribute(file, exr.size(), "", [&](const std::string& name) -> Status {
+        is_ours = is_ours || name.starts_with("baton:");
+        if (name == "dataWindow") exceeds = exceeds || !is_fair_box(file);
+        if (name == "compression") exceeds = exceeds || file.peek() >= Imf::NUM_COMPRESSION_METHODS;
+        return {};
+      });
+  return whole && exceeds && !is_ours;
 }
 
 }  // namespace baton

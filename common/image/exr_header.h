@@ -14,5 +14,9 @@ namespace baton {
 Status check_exr_attributes(const std::filesystem::path& path);
 /// Of bytes that were read from a file of this name.
 Status check_exr_attributes(const std::string& name, ByteView exr);
+/// Whether the header of such a file, which is whole, asks for what is not read here: sides that no
+/// image may have, a compression that is not known; and no worker has written it. Whether the rest
+/// is whole cannot be said then.
+bool exceeds_reader(ByteView exr);
 
 }  // namespace baton

@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "common/base/file_stamp.h"
 #include "common/base/files.h"
 
 namespace baton {
@@ -41,9 +42,22 @@ namespace {
 Result<std::optional<std::string>> read_if_there(const std::filesystem::path& file) {
   Result<std::string> found = read_text_file(file, kMaxTokenBytes);
   if (found) return std::optional(std::move(found).value());
-  const Status there = expect_file(file);
-  if (!there && there.error().kind == ErrorKind::bad_input) return std::optional<std::string>();
+  const Result<std::optional<FileStamp>> there = stamp_of(file);
+  const bool is_none = there ? !*there : there.error().kind == ErrorKind::bad_input;
+  if (is_none) return std::optional<std::string>();
   return Error{ErrorKind::io, found.error().message};
+}
+
+Result<std::string> look_after_token(const std::filesystem::path& file, const std::string& token) {
+  BATON_ASSIGN(const std::optional<std::string> found, read_if_there(file));
+  if (found && *found == token) return std::string();
+  if (found && found->starts_with(token + "\n")) return found->substr(token.size() + 1);
+  return Error{
+      ErrorKind::io,
+      fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "
+                  "say where it is with --map",
+                  file.parent_path().string(), file.filename().string(),
+                  found ? "has another token" : "no such file")};
 }
 
 }  // namespace
@@ -55,21 +69,9 @@ Result<bool> has_token(const std::filesystem::path& file, const std::string& tok
 
 Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token,
                                      Patience* patience) {
-  Result<std::optional<std::string>> read = read_if_there(file);
-  // What cannot be read says nothing of the folder.
-  while (!read) {
-    if (patience == nullptr || !patience->wait_after(read.error())) return read.error();
-    read = read_if_there(file);
-  }
-  const std::optional<std::string>& found = *read;
-  if (found && *found == token) return std::string();
-  if (found && found->starts_with(token + "\n")) return found->substr(token.size() + 1);
-  return Error{
-      ErrorKind::io,
-      fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "
-                  "say where it is with --map",
-                  file.parent_path().string(), file.filename().string(),
-                  found ? "has another token" : "not there")};
+  // What another machine has written may be seen here later.
+  const auto look = [&] { return look_after_token(file, token); };
+  return patience != nullptr ? patiently(look, *patience) : look();
 }
 
 Status expect_token(const std::filesystem::path& file, const std::string& token,

@@ -416,11 +416,19 @@ std::string waits_for(const Scheduler& scheduler, const Digest& digest, TimePoin
   const LeaseBook& leases = scheduler.leases();
   if (!is_open(job.status) || !job.waits.empty()) return job.waits;
   if (scheduler.lacks_renderer(digest)) {
+    // Behind the instruction set it says by which build.
+    const auto build_of = [](const std::string& renderer) {
+      return renderer.substr(std::min(renderer.find(", baton "), renderer.size()));
+    };
+    const bool is_one_build = std::ranges::any_of(leases.connected(), [&](const auto& worker) {
+      return build_of(leases.renderer_of(worker)) == build_of(job.renderer);
+    });
     return fmt::format(
         "a worker that renders as what is done was rendered, with {}: those that are connected "
         "render with {}, and pixels may differ. --restart renders all frames again, --from-frame N "
-        "those from N on; `baton-worker --isa` makes unlike machines alike",
-        job.renderer, leases.renderer_of(leases.connected().front()));
+        "those from N on{}",
+        job.renderer, leases.renderer_of(leases.connected().front()),
+        is_one_build ? "; `baton-worker --isa` makes unlike machines alike" : "");
   }
   if (lacks_room(scheduler, digest)) return room_text(scheduler, job);
   if (leases.connected().empty()) return {};

@@ -75,8 +75,17 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
 
 Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string& text) {
   std::vector<FoundJob> matches;
-  const bool any_named =
-      std::any_of(found.begin(), found.end(), [](const FoundJob& job) { return job.is_named; });
+  const bool any_named = std::ranges::any_of(found, &FoundJob::is_named);
+  // A name that is what people are told of the ID of another job says neither.
+  if (any_named) {
+    const auto other = std::ranges::find(found, false, &FoundJob::is_named);
+    if (other != found.end() && other->id.hex() != text && other->job.hex() != text &&
+        text.size() >= other->id.short_hex().size())
+      return Error{ErrorKind::bad_input,
+                   fmt::format("job '{}': a job has this name, and the ID {} begins so: expected "
+                               "all digits of an ID",
+                               text, other->id.hex())};
+  }
   for (const FoundJob& job : found) {
     if (job.id.hex() == text || job.job.hex() == text) return job.job;
     if (job.is_named == any_named) matches.push_back(job);

@@ -212,6 +212,9 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return others.error();
     return farm_.refuse(peer, others.error());
   }
+  const LockedFrames locked(document.job, farm_.history.jobs().locked(id));
+  if (const Status by_one = message.restart ? Status() : expect_by_one(document, locked); !by_one)
+    return farm_.refuse(peer, by_one.error());
   std::string changes = changes_text(document, id, message.keep_priority);
   if (message.restart) changes = changes.empty() ? "restart" : "restart; " + changes;
   BATON_TRY(farm_.history.submitted(document.digest, id, changes));
@@ -319,18 +322,12 @@ Status Submission::finish(const Digest& version) {
   return grows ? Status() : farm_.step(FramesInspected{version});
 }
 
-/// What jobs of the same picture in the same folder leave to a new one, itself among them.
-/// restart: nothing, where nobody who is connected renders as that was rendered.
-Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& document,
-                                                       bool restart, const LockedFrames& locked,
-                                                       std::vector<std::string>& reasons) {
-  Heritage heritage;
-  BATON_ASSIGN(const auto* neighbours, jobs_in(document.job.output.directory));
-  std::vector<FormerJob> formers;
-  // Where frames of a job are by one renderer, that of the newest which has frames decides.
+/// By what the newest job of the picture was rendered that has frames, or else has anything.
+std::string Submission::newest_renderer(const std::vector<InFolder>& jobs,
+                                        const ParsedJobDocument& document) {
   std::string newest;
   bool has_frames = false;
-  for (const auto& [digest, former] : *neighbours) {
+  for (const auto& [digest, former] : jobs) {
     if (!(former.document.picture == document.picture) || former.renderer.empty()) continue;
     const bool has_some = std::ranges::any_of(former.tasks, [](const Completions::Task& task) {
       return task.task.kind == TaskKind::assemble;
@@ -339,6 +336,64 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
     newest = former.renderer;
     has_frames = has_some;
   }
+  return newest;
+}
+
+KeptFiles Submission::kept_files(const JobSpec& job, const LockedFrames& locked) {
+  return {.has_frame =
+              [this, &job](FrameIndex frame, const BlobRef& image) {
+                return files_.is_right(frame_path(job, frame), image);
+              },
+          .has_blob = [this](const BlobRef& blob) { return farm_.store.contains(blob.digest); },
+          .locked = locked.frames()};
+}
+
+/// Frames of a job are by one renderer. Error (bad_input): of some that are there and right, and by
+/// another one than the newest, only a person can say that they are rendered again.
+Status Submission::expect_by_one(const ParsedJobDocument& document, const LockedFrames& locked) {
+  if (farm_.options.mixed_builds || document.job.output.is_look) return {};
+  BATON_ASSIGN(const auto* neighbours, jobs_in(document.job.output.directory));
+  const std::string newest = newest_renderer(*neighbours, document);
+  std::vector<FormerJob> all, alike;
+  std::string other;
+  for (const auto& [digest, former] : *neighbours) {
+    if (!(former.document.picture == document.picture)) continue;
+    all.push_back(former);
+    if (former.renderer.empty() || former.renderer == newest) {
+      alike.push_back(former);
+    } else {
+      other = former.renderer;
+    }
+  }
+  if (other.empty()) return {};
+  const KeptFiles kept = kept_files(document.job, locked);
+  std::set<FrameIndex> by_others;
+  for (const Completion& frame : adopt(document, all, kept).frames)
+    by_others.insert(frame.task.frame());
+  for (const Completion& frame : adopt(document, alike, kept).frames)
+    by_others.erase(frame.task.frame());
+  if (by_others.empty()) return {};
+  std::vector<FrameNumber> numbers;
+  for (const FrameIndex frame : by_others) numbers.push_back(document.job.frames[frame.index()]);
+  return Error{
+      ErrorKind::bad_input,
+      fmt::format("job '{}': frames {} in {} were rendered with {}, what came later with {}, and "
+                  "pixels may differ\n--restart renders all frames again, --from-frame N those "
+                  "from N on, and keeps the others",
+                  document.job.name, format_frames(numbers), document.job.output.directory, other,
+                  newest)};
+}
+
+/// What jobs of the same picture in the same folder leave to a new one, itself among them.
+/// restart: nothing, where nobody who is connected renders as that was rendered.
+Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& document,
+                                                       bool restart, const LockedFrames& locked,
+                                                       std::vector<std::string>& reasons) {
+  Heritage heritage;
+  BATON_ASSIGN(const auto* neighbours, jobs_in(document.job.output.directory));
+  std::vector<FormerJob> formers;
+  // Where frames of a job are by one renderer, that decides.
+  const std::string newest = newest_renderer(*neighbours, document);
   for (auto& [digest, former] : *neighbours) {
     if (!(former.document.picture == document.picture)) continue;
     const bool is_other =
@@ -353,14 +408,7 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
     heritage.formers.push_back(digest);
   }
   folders_.clear();
-  const KeptFiles kept{
-      .has_frame =
-          [&](FrameIndex frame, const BlobRef& image) {
-            return files_.is_right(frame_path(document.job, frame), image);
-          },
-      .has_blob = [&](const BlobRef& blob) { return farm_.store.contains(blob.digest); },
-      .locked = locked.frames()};
-  heritage.adoption = adopt(document, formers, kept);
+  heritage.adoption = adopt(document, formers, kept_files(document.job, locked));
   const Adoption& adoption = heritage.adoption;
   if (!formers.empty()) {
     const FormerJob& beside = formers[adoption.beside.value_or(formers.size() - 1)];

@@ -64,6 +64,10 @@ class Submission {
   };
   Result<WrittenSweeps> written_sweeps(const ParsedJobDocument& document);
   Result<bool> grow(const Digest& version);
+  static std::string newest_renderer(const std::vector<InFolder>& jobs,
+                                     const ParsedJobDocument& document);
+  Status expect_by_one(const ParsedJobDocument& document, const LockedFrames& locked);
+  KeptFiles kept_files(const JobSpec& job, const LockedFrames& locked);
   std::string changes_text(const ParsedJobDocument& document, const JobId& job, bool keep_priority);
   Status take_priority(const ParsedJobDocument& document);
   Status begin_growth(const ParsedJobDocument& document, bool restart);

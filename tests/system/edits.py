@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 
 from chaos_jobs import FOREIGN_ISA, KINDS, Job, Undisturbed, edits_of
-from farm import OK, PATIENCE, Farm, Fault, Programs, check, wait_until
+from farm import BAD_INPUT, OK, PATIENCE, Farm, Fault, Programs, check, wait_until
 
 EDITS, END_S = 5, 300 * PATIENCE
 AT_ONCE = 4  # sequences on one farm
@@ -75,13 +75,16 @@ class Sequence:
 
     def submit(self, *options):
         answer = self.farm.baton("job", "submit", self.job.path, "--json", *options, expect=None)
+        if answer.returncode == BAD_INPUT and "pixels may differ" in answer.stderr:  # frames of the others are there
+            self.diary.append("asked, --restart")
+            answer = self.farm.baton("job", "submit", self.job.path, "--json", "--restart", expect=None)
         check(answer.returncode == OK, f"{self}: {answer.stderr}")
         ident = json.loads(answer.stdout)["id"]
         check(self.job.id in (None, ident), f"{self}: another ID, {ident} after {self.job.id}")
         self.job.id = ident
 
     def submit_turn(self):
-        """What the first workers made of the frames that the version of the others has not is of no use to the next version."""
+        """What the first workers made of the frames that the version of the others has not: only --restart replaces it."""
         is_first = self.turn == 2
         if is_first:
             self.workers.switch()

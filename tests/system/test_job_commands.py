@@ -92,6 +92,13 @@ def names_of_jobs(programs, folder):
             check("job 'new oak': 2 jobs have this name:" in done.stderr, done.stderr)
             check(f"{second}  paused" in done.stderr and f"{third}  running" in done.stderr, done.stderr)
 
+        # A name may be what is told of another job's ID.
+        farm.submit(small_job(folder / "d", name=first[:8], seed=4))
+        for command in ["lock", "pause", "cancel"]:
+            done = farm.baton("job", command, first[:8], *(["--frames", "1"] if command == "lock" else []), expect=BAD_INPUT)
+            check(f"a job has this name, and the ID {first} begins so" in done.stderr, done.stderr)
+        check_equal(farm.show(first)["id"], first, "job of this ID")
+
         # Every command takes the name where it is one job's.
         for command, status in [("resume", "running"), ("pause", "paused"), ("cancel", "cancelled"), ("retry", "running"),
                                 ("cancel", "cancelled")]:

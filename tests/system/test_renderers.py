@@ -4,7 +4,7 @@
 import re
 import time
 
-from farm import IO, OK, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
+from farm import BAD_INPUT, IO, OK, USAGE, Farm, Process, check, check_equal, check_says, run_tests, wait_until
 from jobs import make_job, write_job
 
 FRAMES = 6
@@ -121,10 +121,33 @@ def what_is_kept_is_by_one(programs, folder):
             wait_until(lambda: "joined" in farm.workers[-1].log() or farm.coordinator.log().count("joined") == 2, "it is there")
             farm.baton("job", "submit", make(place, **{**small, **second}), "--restart")
             farm.wait_for(ident)
-            said = farm.baton("job", "submit", make(place, **{**small, **third}))
-            check_says(said.stderr + said.stdout, "nothing is kept that was rendered with")
+            refused = farm.baton("job", "submit", make(place, **{**small, **third}), expect=None)
+            if name == "frames":  # of the first version two are there
+                check_equal(refused.returncode, BAD_INPUT, "exit code")
+                check_says(refused.stderr, "frames 3-4 in", "--restart renders all frames again, --from-frame N those from N on")
+                refused = farm.baton("job", "submit", place / "job.json", "--restart")
+            check_says(refused.stderr + refused.stdout, "nothing is kept that was rendered with")
             farm.wait_for(ident)
         check_equal(programs.pixels(place / "frames"), expected, f"pixels, {name}")
+
+
+def frames_before_another_set_took_over_stay(programs, folder):
+    """Nothing is carried: the plain command keeps both parts, or says that it cannot."""
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    path = make(folder, sampling={"method": "mis"}, state={"carry": False})
+    programs.render(path, folder / "work", extra=("--isa", sets[-1]))
+    programs.render(path, folder / "work", extra=("--isa", sets[0], "--from-frame", "3"))
+    both = {frame.name: frame.read_bytes() for frame in (folder / "frames").glob("*.exr")}
+    for isa in sets[0], sets[-1]:
+        refused = programs.render(path, folder / "work", extra=("--isa", isa), expect=BAD_INPUT)
+        check_says(refused.stderr, "frames 1-2 in", "were rendered with", "--restart renders all frames again")
+        check_equal({frame.name: frame.read_bytes() for frame in (folder / "frames").glob("*.exr")}, both, "frames")
+    programs.render(path, folder / "work", extra=("--isa", sets[0], "--from-frame", "3"))
+    programs.render(path, folder / "work", extra=("--isa", sets[0], "--restart"))
+    makers = {renderer_of(frame) for frame in (folder / "frames").glob("*.exr")}
+    check_equal(len(makers), 1, "renderers")
 
 
 def frames_of_another_coordinators_set_stay(programs, folder):

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "common/base/files.h"
@@ -83,6 +84,30 @@ TEST_F(ExrCheckTest, WhatIsCutOrNoExrIsNone) {
   }
   write(as_bytes_view(std::string_view("no picture at all")));
   EXPECT_EQ(text(), std::nullopt);
+}
+
+// Wider than what is read here, or packed in a way that is not known: nobody can say that it is
+// damaged, and it is not a worker's.
+TEST_F(ExrCheckTest, WhatIsBeyondTheReaderIsSomebodys) {
+  using namespace std::string_view_literals;
+  const auto changed = [](Bytes exr, std::string_view key, std::size_t at, std::uint8_t value) {
+    const auto found = std::ranges::search(exr, as_bytes_view(key));
+    EXPECT_FALSE(found.empty());
+    if (!found.empty()) *(found.end() + static_cast<std::ptrdiff_t>(at)) = std::byte{value};
+    return exr;
+  };
+  const FilmTile image{{0, 0, 2, 1}, {"B", "G", "R"}, {1, 2, 3, 4, 5, 6}};
+  const Bytes person = encode_exr("test", image, {}).value();
+  for (const Bytes& exr : {person, bytes}) {
+    const std::optional<std::string> verdict =
+        exr == person ? std::optional(std::string()) : std::nullopt;
+    write(changed(exr, "dataWindow\0box2i\0\x10\0\0\0"sv, 10, 1));  // x to 65537
+    EXPECT_EQ(text(), verdict);
+    write(changed(exr, "compression\0compression\0\x01\0\0\0"sv, 0, 200));
+    EXPECT_EQ(text(), verdict);
+  }
+  write(ByteView(changed(person, "compression\0compression\0\x01\0\0\0"sv, 0, 200)).first(100));
+  EXPECT_EQ(text(), std::nullopt) << "its header is cut";
 }
 
 // Packed pixels have a checksum: nearly every changed byte of them is found.

@@ -312,7 +312,7 @@ TEST(MapCache, AMapThatDoesNotFitIsRefused) {
   EXPECT_EQ(map.error().message,
             path +
                 ": 16384 x 8192 pixels, expected at most 19.1 million, 44 bytes each, of the "
-                "worker's 800 MiB (--memory)");
+                "worker's (--memory) 800 MiB");
 }
 
 // An error of the moment is waited for; what is wrong with a map stays wrong.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <fstream>
 #include <mutex>
+#include <thread>
 
 #include "coordinator/service/service.h"
 #include "tests/unit/service/fake_farm.h"
@@ -242,6 +244,20 @@ TEST_F(FileTableTest, AFileIsReadOnceAndAgainWhenItHasChanged) {
   table.add(picture);
   EXPECT_EQ(table.judge(file, frame).state, FileState::strange);
   EXPECT_EQ(table.judge(file, frame).writer, "somebody");
+}
+
+// Written by a machine whose clock is ahead, changed in place, and its date put back.
+TEST_F(FileTableTest, ADateInTheFutureHidesNoChange) {
+  FileTable table;
+  write("bytes");
+  const auto ahead = fs::last_write_time(file) + std::chrono::hours(1);
+  fs::last_write_time(file, ahead);
+  table.add(read());
+  EXPECT_EQ(table.judge(file, frame).state, FileState::right);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // the kernel's clock goes on
+  std::ofstream(file, std::ios::in | std::ios::out) << "other";
+  fs::last_write_time(file, ahead);
+  EXPECT_EQ(table.judge(file, frame).state, FileState::unknown);
 }
 
 TEST_F(FileTableTest, WhatCannotBeReadIsNeitherThereNorGone) {

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "common/base/files.h"
 
 namespace baton {
@@ -27,15 +30,31 @@ TEST(FolderToken, ATokenStaysAndTellsItsFolder) {
   }
 }
 
-// What cannot be read is no other folder.
+// What cannot be read is no other folder; a folder in its place is none.
 TEST(FolderToken, WhyItCannotBeReadIsSaid) {
-  const fs::path file = fs::path(testing::TempDir()) / "unreadable" / "token";
-  fs::remove_all(file.parent_path());
-  fs::create_directories(file);
+  const fs::path folder = fs::path(testing::TempDir()) / "unreadable";
+  fs::remove_all(folder);
+  fs::create_directories(folder / "token");
+  const fs::path file = folder / std::string(300, 'a');  // longer than names are
   const Status seen = expect_token(file, "abc");
   ASSERT_FALSE(seen);
   EXPECT_EQ(seen.error().kind, ErrorKind::io) << "of the moment: it is looked at again";
-  EXPECT_EQ(seen.error().message, file.string() + ": is a folder, expected a file");
+  EXPECT_THAT(seen.error().message, HasSubstr("File name too long"));
+  EXPECT_FALSE(has_token(file, "abc"));
+  EXPECT_FALSE(has_token(folder / "token", "abc").value());
+}
+
+// As of a file system that shows late what another machine has written.
+TEST(FolderToken, OneThatComesLateIsWaitedFor) {
+  const fs::path file = fs::path(testing::TempDir()) / "late" / "token";
+  fs::remove_all(file.parent_path());
+  std::thread writer([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    EXPECT_TRUE(write_token(file, "abc", "1"));
+  });
+  Patience patience;
+  EXPECT_EQ(read_after_token(file, "abc", &patience).value(), "1");
+  writer.join();
 }
 
 TEST(FolderToken, ALineMayStandAfterIt) {
