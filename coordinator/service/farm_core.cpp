@@ -360,6 +360,7 @@ Result<std::string> FarmCore::mark_output(const Digest& job) {
 Status FarmCore::mark_output_again(const Digest& job) {
   if (marked_.erase(job) == 0) return {};
   const Result<std::string> marked = mark_output(job);
+  marked_.insert(job);  // one that cannot be written is lost still
   return marked ? Status() : marked.error();
 }
 

@@ -208,14 +208,15 @@ std::string files_text(const std::vector<FramesInDoubt::Frame>& frames) {
   return text + (frames.size() > kMost ? fmt::format(" and {} more", frames.size() - kMost) : "");
 }
 
-std::string numbers_text(const std::vector<FramesInDoubt::Frame>& frames) {
+std::vector<FrameNumber> numbers_of(const std::vector<FramesInDoubt::Frame>& frames) {
   std::vector<FrameNumber> numbers;
   for (const FramesInDoubt::Frame& frame : frames) numbers.push_back(frame.number);
-  return format_frames(numbers);
+  return numbers;
 }
 
-/// Under which numbers the files of frames are a job's, as far as they are; empty: none is.
-std::string numbers_text(const std::vector<FramesInDoubt::Frame>& frames, const JobSpec& job) {
+/// Under which numbers the files of frames are a job's, as far as they are.
+std::vector<FrameNumber> numbers_in(const JobSpec& job,
+                                    const std::vector<FramesInDoubt::Frame>& frames) {
   std::vector<FrameNumber> numbers;
   for (const FrameNumber number : job.frames) {
     const fs::path path =
@@ -223,7 +224,7 @@ std::string numbers_text(const std::vector<FramesInDoubt::Frame>& frames, const 
     if (std::ranges::find(frames, path.string(), &FramesInDoubt::Frame::file) != frames.end())
       numbers.push_back(number);
   }
-  return numbers.empty() ? "" : format_frames(numbers);
+  return numbers;
 }
 
 }  // namespace
@@ -240,10 +241,14 @@ std::string doubt_text(const FramesInDoubt& doubt, const JobId& job, const JobSp
                       "coordinator's)"
                     : "another picture, changed or replaced",
         is_one ? "it" : "them");
-    const std::string numbers = known ? numbers_text(frames, *known) : numbers_text(frames);
+    const std::vector<FrameNumber> numbers =
+        known ? numbers_in(*known, frames) : numbers_of(frames);
     if (!job.empty() && !numbers.empty())
       text += fmt::format(", `baton job lock {} --frames {}` keeps {} for good", job.short_hex(),
-                          numbers, is_one ? "it" : "them");
+                          format_frames(numbers),
+                          numbers.size() < frames.size() ? "those"
+                          : is_one                       ? "it"
+                                                         : "them");
   }
   if (const auto& frames = doubt.locked_absent; !frames.empty()) {
     const bool is_one = frames.size() == 1;
@@ -251,7 +256,7 @@ std::string doubt_text(const FramesInDoubt& doubt, const JobId& job, const JobSp
         "{}{} {} locked and not there: put {} back, or have {} rendered with `baton job lock {} "
         "--off --frames {}`",
         text.empty() ? "" : "; ", files_text(frames), is_one ? "is" : "are", is_one ? "it" : "them",
-        is_one ? "it" : "them", job.short_hex(), numbers_text(frames));
+        is_one ? "it" : "them", job.short_hex(), format_frames(numbers_of(frames)));
   }
   return text;
 }

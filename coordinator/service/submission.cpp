@@ -400,7 +400,7 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
         !farm_.options.mixed_builds && !former.renderer.empty() && former.renderer != newest;
     const std::string held = held_to(former.renderer, former.is_mixed, farm_.options.mixed_builds);
     if (is_other || (restart && farm_.scheduler.leases().nobody_renders_as(held))) {
-      std::string reason = "nothing is kept that was rendered with " + held;
+      std::string reason = "nothing is kept of these that was rendered with " + held;
       if (std::ranges::find(reasons, reason) == reasons.end()) reasons.push_back(std::move(reason));
       continue;
     }
@@ -536,6 +536,7 @@ Result<LostFiles> Submission::lost_files_of(const Digest& job, bool restart) {
   if (!mark) return lost;
   if (lost.num_frames == 0 || lost.all_frames_right()) {
     BATON_TRY(farm_.mark_output_again(job));
+    lost.unreadable = farm_.lost_mark(job, spec);
   } else {
     lost.unreadable = mark;
   }

@@ -126,7 +126,7 @@ def what_is_kept_is_by_one(programs, folder):
                 check_equal(refused.returncode, BAD_INPUT, "exit code")
                 check_says(refused.stderr, "frames 3-4 in", "--restart renders all frames again, --from-frame N those from N on")
                 refused = farm.baton("job", "submit", place / "job.json", "--restart")
-            check_says(refused.stderr + refused.stdout, "nothing is kept that was rendered with")
+            check_says(refused.stderr + refused.stdout, "nothing is kept of these that was rendered with")
             farm.wait_for(ident)
         check_equal(programs.pixels(place / "frames"), expected, f"pixels, {name}")
 
@@ -284,7 +284,7 @@ def the_one_command_says_so(programs, folder):
 
     # What is done is begun again as well.
     said = programs.run("baton", *command, sets[-1], "--restart")
-    check_says(said.stderr, "nothing is kept that was rendered with")
+    check_says(said.stderr, "nothing is kept of these that was rendered with")
     makers = {renderer_of(frame) for frame in (folder / "frames").glob("*.exr")}
     check(makers == {renderer_of(folder / "frames/frame.0001.exr")} != {renderer_of(witness / "frames/frame.0001.exr")}, f"renderers {makers}")
 
@@ -303,7 +303,7 @@ def a_locked_frame_holds_a_job_to_no_renderer(programs, folder):
         worker.wait()
         farm.start_worker(extra=("--isa", sets[0]))
         wait_until(lambda: farm.coordinator.log().count("joined") == 2, "it is there")
-        check_says(farm.baton("job", "submit", folder / "job.json", "--restart").stderr, "nothing is kept that was rendered with")
+        check_says(farm.baton("job", "submit", folder / "job.json", "--restart").stderr, "nothing is kept of these that was rendered with")
         farm.wait_for(ident)
         check_equal((folder / "frames/frame.0003.exr").read_bytes(), locked, "the locked frame")
         check(renderer_of(folder / "frames/frame.0001.exr") != renderer_of(folder / "frames/frame.0003.exr"), "frame 1 is of before")

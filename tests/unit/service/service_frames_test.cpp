@@ -128,6 +128,24 @@ TEST_F(FramesTest, AFolderThatLostItsMarkIsNotTheFolder) {
   for (int number = 1; number <= 4; ++number) EXPECT_TRUE(fs::exists(frame(number)));
 }
 
+// Nobody could see another in its place: the job waits, however often it is asked.
+TEST_F(FramesTest, AFolderInThePlaceOfTheMarkIsSaid) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  fs::remove(mark(id));
+  fs::create_directory(mark(id));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::paused);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_THAT(refused(service.endpoint(), ResumeJob{id.hex()}).message,
+                HasSubstr(mark(id).filename().string() + " in it is another's"));
+  }
+  fs::remove(mark(id));
+  EXPECT_EQ(ask<ShownJob>(service.endpoint(), ResumeJob{id.hex()}).detail.summary.status,
+            JobStatus::running);
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+}
+
 // Frames without a mark are proof enough; no frames are none, but to whoever says --restart.
 TEST_F(FramesTest, OnlyAFolderWithAllFramesIsMarkedAgain) {
   const RunningService service(options);
