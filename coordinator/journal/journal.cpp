@@ -215,10 +215,11 @@ Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int cou
 }
 
 Result<std::map<FrameIndex, FrameFile>> Journal::frame_files(const Digest& job) {
-  BATON_ASSIGN(SqlStatement query,
-               database_.prepare("SELECT frame, '', 0, 0, 0, 1 FROM rendered_frames WHERE job = ?1 "
-                                 "UNION ALL SELECT frame, digest, size_bytes, inode, time_ns, 0 "
-                                 "FROM frame_files WHERE job = ?1"));
+  BATON_ASSIGN(
+      SqlStatement query,
+      database_.prepare("SELECT frame, '', 0, 0, 0, position FROM rendered_frames WHERE job = ?1 "
+                        "UNION ALL SELECT frame, digest, size_bytes, inode, time_ns, 0 "
+                        "FROM frame_files WHERE job = ?1"));
   query.bind(job);
   std::map<FrameIndex, FrameFile> files;
   while (true) {
@@ -226,7 +227,7 @@ Result<std::map<FrameIndex, FrameFile>> Journal::frame_files(const Digest& job) 
     if (!row) return files;
     FrameFile& file = files[FrameIndex(static_cast<std::int32_t>(query.integer(0)))];
     file.is_gone = query.integer(5) != 0;
-    file.was_rendered = file.was_rendered || file.is_gone;
+    file.rendered = std::max(file.rendered, query.integer(5));
     file.digest = Digest::from_hex(query.text(1)).value_or(Digest());
     file.stamp = {.size_bytes = static_cast<std::uint64_t>(query.integer(2)),
                   .inode = static_cast<std::uint64_t>(query.integer(3)),
@@ -356,8 +357,8 @@ Status Journal::record_frame_file(const Digest& job, FrameIndex frame,
     return change("DELETE FROM frame_files WHERE job = ? AND frame = ?", job,
                   std::int64_t{frame.value()});
   }
-  if (file->was_rendered) {
-    BATON_TRY(change("INSERT OR IGNORE INTO rendered_frames VALUES (?, ?)", job,
+  if (file->rendered != 0) {
+    BATON_TRY(change("INSERT OR REPLACE INTO rendered_frames (job, frame) VALUES (?, ?)", job,
                      std::int64_t{frame.value()}));
   }
   return change(

@@ -35,8 +35,9 @@ struct FrameFile {
   /// Digest(): a worker may have written it, and nothing else is known.
   Digest digest;
   FileStamp stamp;
-  /// Whether its worker has ever reported it, though that may be forgotten since.
-  bool was_rendered = false;
+  /// When its worker last reported it, in the order in which frames of all jobs were reported,
+  /// though that may be forgotten since; 0: never. To be recorded: whether it has.
+  std::int64_t rendered = 0;
   /// Whether nothing else is known: what a worker wrote there is not in its place any more.
   bool is_gone = false;
 };

@@ -71,15 +71,15 @@ inline constexpr const char* kSchema = R"sql(
 
 /// Tables that a journal of this version may lack: it gets them when it is opened, and an earlier
 /// program leaves them alone. `frame_files` says how a frame's file stood when it had this digest
-/// (none: a worker may have written it), `rendered_frames` which frames a job has had, whatever has
-/// become of them since, `output_marks` of which open jobs the output folder is
-/// marked; store_token has one row, or none. `renderers`: by what the tasks of a job were done that
-/// are done, the last ones of `mixed_jobs`; `former_renderers`: by what those that are forgotten,
-/// empty where they were mixed. Where other tables say `job`, they mean the digest of a document: a
-/// version. `versions` says of which job (JobId) it is the n-th, `identities` when what happened to
-/// that job, `locked_frames` which of its frames count as done whatever is in their files and
-/// `lock_times` when that last changed, `priorities` which priority a person has set in place of
-/// the one that is written in its document, `growth` how it has come by its sweeps.
+/// (none: a worker may have written it), `rendered_frames` in which order jobs have last rendered
+/// frames, whatever has become of them since, `output_marks` of which open jobs the output folder
+/// is marked; store_token has one row, or none. `renderers`: by what the tasks of a job were done
+/// that are done, the last ones of `mixed_jobs`; `former_renderers`: by what those that are
+/// forgotten, empty where they were mixed. Where other tables say `job`, they mean the digest of a
+/// document: a version. `versions` says of which job (JobId) it is the n-th, `identities` when what
+/// happened to that job, `locked_frames` which of its frames count as done whatever is in their
+/// files and `lock_times` when that last changed, `priorities` which priority a person has set in
+/// place of the one that is written in its document, `growth` how it has come by its sweeps.
 /// `pictures_given_up` are those that a job may replace though no job has written them;
 /// `marked_folders` what output folders were, without links, when a job marked them, or a frame in
 /// them was locked. `events` is appended to alone (FarmEvent), without an index, which would cost
@@ -91,7 +91,8 @@ inline constexpr const char* kLaterTables = R"sql(
     size_bytes INTEGER NOT NULL, inode INTEGER NOT NULL, time_ns INTEGER NOT NULL,
     PRIMARY KEY (job, frame)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS rendered_frames (
-    job TEXT NOT NULL, frame INTEGER NOT NULL, PRIMARY KEY (job, frame)) WITHOUT ROWID;
+    position INTEGER PRIMARY KEY AUTOINCREMENT,
+    job TEXT NOT NULL, frame INTEGER NOT NULL, UNIQUE (job, frame));
   CREATE TABLE IF NOT EXISTS output_marks (job TEXT PRIMARY KEY) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS store_token (token TEXT NOT NULL);
   CREATE TABLE IF NOT EXISTS renderers (job TEXT PRIMARY KEY, renderer TEXT NOT NULL) WITHOUT ROWID;

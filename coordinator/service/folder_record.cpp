@@ -36,12 +36,12 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
     Writer& writer = record.jobs_[other];
     BATON_ASSIGN(writer.renderers, journal.renderers(other));
     BATON_ASSIGN(const auto granted, journal.frame_files(other));
-    std::set<fs::path> lost;
+    std::map<fs::path, std::int64_t> rendered;
     for (const auto& [frame, file] : granted) {
       if (frame.index() >= document->job.frames.size()) continue;
       const fs::path path = frame_path(document->job, frame);
       if (!file.is_gone) writer.granted.insert(path);
-      if (file.was_rendered) lost.insert(path);
+      if (file.rendered != 0) rendered[path] = file.rendered;
     }
     // What another job had when it ended, less what it has lost since.
     std::optional<JobDetail> ended;
@@ -56,12 +56,16 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
           ended && std::ranges::find(ended->frames_done, document->job.frames[frame.index()]) ==
                        ended->frames_done.end();
       const fs::path path = frame_path(document->job, frame);
-      record.images_[path].push_back({other, done.made.outputs.front(), is_given_away});
-      lost.erase(path);
+      const auto last = rendered.extract(path);
+      record.images_[path].push_back({.job = other,
+                                      .image = done.made.outputs.front(),
+                                      .is_given_away = is_given_away,
+                                      .rendered = last ? last.mapped() : 0});
       return {};
     }));
-    for (const fs::path& path : lost)
-      record.images_[path].push_back({.job = other, .image = {}, .is_lost = true});
+    for (const auto& [path, last] : rendered)
+      record.images_[path].push_back(
+          {.job = other, .image = {}, .rendered = last, .is_lost = true});
   }
   record.mark_superseded();
   return record;
@@ -71,24 +75,25 @@ void FolderRecord::mark_superseded() {
   const auto age = [&](const Image& image) {
     return std::ranges::find(family_, image.job) - family_.begin();
   };
-  const auto was_had = [](const Image& image) {
-    return image.is_lost || !image.image.is_placeholder();
-  };
-  const auto is_of_job = [&](const Image& image) {
-    return age(image) < std::ssize(family_) && was_had(image);
-  };
+  const auto is_of_job = [&](const Image& image) { return age(image) < std::ssize(family_); };
+  const auto is_there = [](const Image& image) { return !image.image.is_placeholder(); };
   for (auto& [path, images] : images_) {
     std::ptrdiff_t newest = -1;
     for (const Image& image : images) {
-      if (is_of_job(image)) newest = std::max(newest, age(image));
+      if (is_of_job(image) && is_there(image)) newest = std::max(newest, age(image));
     }
-    // One that was given away stays what it is until there is another in its place.
-    const bool has_owner = std::ranges::any_of(
-        images, [&](const Image& image) { return !image.is_given_away && was_had(image); });
     for (Image& image : images) {
-      image.is_superseded =
-          image.job != version_ &&
-          (is_of_job(image) ? age(image) < newest : image.is_given_away && has_owner);
+      const bool is_own = is_of_job(image);
+      // One that was given away stays what it is until there is another in its place, be that to be
+      // rendered once more by now.
+      const bool came_before = std::ranges::any_of(images, [&](const Image& other) {
+        const bool is_later =
+            other.rendered > image.rendered || (image.rendered == 0 && is_there(other));
+        return is_later && (is_own ? other.is_lost && is_of_job(other)
+                                   : image.is_given_away && !other.is_given_away);
+      });
+      image.is_superseded = image.job != version_ && is_there(image) &&
+                            (came_before || (is_own && age(image) < newest));
     }
   }
 }

@@ -55,6 +55,8 @@ class FolderRecord {
     BlobRef image;
     /// Another job, whose picture it was to be, has it not any more.
     bool is_given_away = false;
+    /// FrameFile::rendered.
+    std::int64_t rendered = 0;
     /// It was rendered, and is to be rendered once more: `image` is nothing.
     bool is_lost = false;
     /// Somebody else has written a picture there since.

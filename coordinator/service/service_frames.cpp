@@ -53,7 +53,7 @@ Status Service::keep_frame_file(const TaskDone& report, const ReportedFrame& fra
   if (given_up.contains(name))
     BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return file == name; }));
   return farm_.journal.record_frame_file(report.lease.job, report.lease.task.frame(),
-                                         FrameFile{frame.digest, stamp, true});
+                                         FrameFile{frame.digest, stamp, 1});
 }
 
 /// A job whose output folder is another one than that which was marked is paused: what is missing

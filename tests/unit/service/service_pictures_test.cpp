@@ -141,6 +141,35 @@ TEST_F(FramesTest, AFormerVersionsPictureIsKeptThoughTheNewerOneIsGone) {
   EXPECT_THAT(granted, testing::Not(testing::Contains(digest_of(of_former))));
 }
 
+// The former one once more, which replaces the newer one's.
+TEST_F(FramesTest, AFormerDocumentAgainReplacesTheNewerOnes) {
+  for (const bool is_job : {false, true}) {
+    SCOPED_TRACE(is_job);
+    fs::remove_all(job.output.directory);
+    job.seed += 10;
+    document = make_job_document(job).value();
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    const Digest former = ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).version;
+    EXPECT_EQ(finish(service.endpoint(), worker, former).summary.status, JobStatus::done);
+    JobSpec newer = job;
+    newer.seed += 1;
+    if (is_job) newer.name = "other";
+    const std::string text = make_job_document(newer).value();
+    const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{text, true}).version;
+    FakeWorker next(service.endpoint(), store(), newer, "next");
+    next.hello();
+    EXPECT_EQ(finish(service.endpoint(), next, id).summary.status, JobStatus::done);
+    const std::string newest = read_text_file(frame(2), 100).value();
+    EXPECT_EQ(ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).version, former);
+    const LeaseId lease = wait_for_frame_2(worker);
+    worker.say(LeaseReturn{lease, {}, {}, digest_of(newest), writer_of(id)});
+    wait_for_frame_2(worker);
+    EXPECT_THAT(granted, testing::Contains(digest_of(newest)));
+  }
+}
+
 // Written, and never reported: it is its job's, and no other replaces it unasked.
 TEST_F(FramesTest, AnotherJobReplacesNothingThatWasOnlyGranted) {
   const RunningService service(options);
