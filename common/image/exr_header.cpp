@@ -7,7 +7,8 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
-#include <sstream>
+#include <istream>
+#include <streambuf>
 #include <string_view>
 #include <utility>
 
@@ -17,6 +18,28 @@ namespace baton {
 namespace {
 
 constexpr std::uint32_t kMultiPart = 0x1000;
+
+/// Bytes that are read as a file, where they lie.
+class ViewBuffer : public std::streambuf {
+ public:
+  explicit ViewBuffer(ByteView bytes) {
+    char* const begin = const_cast<char*>(reinterpret_cast<const char*>(bytes.data()));
+    setg(begin, begin, begin + bytes.size());  // never written to
+  }
+
+ protected:
+  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override {
+    const off_type base = from == std::ios_base::beg   ? 0
+                          : from == std::ios_base::cur ? gptr() - eback()
+                                                       : egptr() - eback();
+    return seekpos(base + offset, std::ios_base::in);
+  }
+  pos_type seekpos(pos_type place, std::ios_base::openmode) override {
+    if (place < 0 || place > egptr() - eback()) return pos_type(off_type(-1));
+    setg(eback(), eback() + static_cast<off_type>(place), egptr());
+    return place;
+  }
+};
 
 /// Little-endian.
 std::uint32_t read_u32(std::istream& file) {
@@ -128,7 +151,8 @@ Status check_exr_attributes(const std::filesystem::path& path) {
 }
 
 Status check_exr_attributes(const std::string& name, ByteView exr) {
-  std::istringstream file(std::string(reinterpret_cast<const char*>(exr.data()), exr.size()));
+  ViewBuffer buffer(exr);
+  std::istream file(&buffer);
   return check_attributes(file, exr.size(), name);
 }
 
@@ -136,7 +160,8 @@ bool exceeds_reader(ByteView exr) {
   constexpr std::string_view kMagic = "\x76\x2f\x31\x01";
   if (!std::ranges::equal(exr.first(std::min(exr.size(), kMagic.size())), as_bytes_view(kMagic)))
     return false;
-  std::istringstream file(std::string(reinterpret_cast<const char*>(exr.data()), exr.size()));
+  ViewBuffer buffer(exr);
+  std::istream file(&buffer);
   bool exceeds = false, is_ours = false;
   const Status whole =
       for_each_attribute(file, exr.size(), "", [&](const std::string& name) -> Status {

@@ -136,26 +136,40 @@ ConnectionWatch::Connections::iterator ConnectionWatch::forget(Connections::iter
 }
 
 void ConnectionWatch::close_unwelcome() {
+  constexpr std::uint64_t kMaxUnendedInAll = 4 * limits::kMaxUnendedBytes;
   const auto silent_since = std::chrono::steady_clock::now() - limits::kSilenceAllowed;
   std::map<std::string, int> silent;
+  std::multimap<std::uint64_t, int, std::greater<>> unended;  // the most first
+  std::uint64_t unended_in_all = 0;
   for (auto next = connections_.begin(); next != connections_.end();) {
     const auto& [descriptor, connection] = *next;
     const std::optional<std::uint64_t> bytes = bytes_received(descriptor);
-    const bool is_endless =
-        bytes && !connection.has_spoken && *bytes > connection.bytes + limits::kMaxUnendedBytes;
+    const std::uint64_t more =
+        bytes && !connection.has_spoken ? *bytes - std::min(*bytes, connection.bytes) : 0;
+    const bool is_endless = more > limits::kMaxUnendedBytes;
     const bool is_silent = bytes && !connection.is_known && connection.made < silent_since;
     const bool is_crowd = is_silent && ++silent[connection.address] > limits::kMaxSilentConnections;
-    if (is_endless || is_crowd) {
-      ::shutdown(descriptor, SHUT_RDWR);
-      note(is_endless ? Failure::endless : Failure::crowd);
-    }
     if (!bytes || is_endless || is_crowd) {
+      if (bytes) close(descriptor, is_endless ? Failure::endless : Failure::crowd);
       next = forget(next);
       continue;
     }
+    unended.emplace(more, descriptor);
+    unended_in_all += more;
     if (std::exchange(next->second.has_spoken, false)) next->second.bytes = *bytes;
     ++next;
   }
+  for (const auto& [more, descriptor] : unended) {
+    if (unended_in_all <= kMaxUnendedInAll) break;
+    unended_in_all -= more;
+    close(descriptor, Failure::endless);
+    forget(connections_.find(descriptor));
+  }
+}
+
+void ConnectionWatch::close(int descriptor, Failure failure) {
+  ::shutdown(descriptor, SHUT_RDWR);
+  note(failure);
 }
 
 void ConnectionWatch::note(Failure failure) {

@@ -74,6 +74,7 @@ class ConnectionWatch {
   using Connections = std::map<int, Connection>;  ///< by file descriptor
 
   void note(Failure failure);
+  void close(int descriptor, Failure failure);
   Connections::iterator forget(Connections::iterator connection);
 
   zmq::socket_t& watched_;

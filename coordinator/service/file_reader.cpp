@@ -1,5 +1,7 @@
 #include "coordinator/service/file_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -70,6 +72,14 @@ FileContent FileReader::read(const FileToRead& file) const {
   }
   content.stamp = *stamp;
   if (!content.stamp) return content;
+  const std::uint64_t size = content.stamp->size_bytes;
+  const bool is_frame = file.is_frame || !file.sizes.empty();
+  if (is_frame && size > FileToRead::kMaxStrangeBytes &&
+      std::ranges::find(file.sizes, size) == file.sizes.end()) {
+    content.fault = fmt::format("{}: {} MiB, which no frame here has: move it away",
+                                file.path.string(), size >> 20);
+    return content;
+  }
   Bytes bytes;
   if (!file.expected.empty() && file.known == content.stamp) {
     content.digest = file.expected.front();

@@ -34,6 +34,10 @@ struct FileToRead {
   std::optional<FileStamp> known = {};
   /// Whether it is one is seen also where no digest is expected.
   bool is_frame = false;
+  /// That a frame may have. One of another size is not read where it is larger than
+  /// kMaxStrangeBytes: it may cost more memory than there is.
+  std::vector<std::uint64_t> sizes = {};
+  static constexpr std::uint64_t kMaxStrangeBytes = 512ull << 20;
 };
 
 /// Files of one request, in its order.

@@ -122,7 +122,9 @@ bool FolderRecord::may_be_unreported(const fs::path& path, const FileVerdict& pi
   if (writer == jobs_.end() || is_locked(path)) return false;
   const Digest& job = writer->first;
   const std::set<std::string>& renderers = writer->second.renderers;
-  const bool is_by_us = renderers.empty() || std::ranges::any_of(renderers, [&](const auto& known) {
+  // One that is not said was reported here (Service::keep_frame_file).
+  const bool is_by_us = renderers.empty() || picture.writer == job.hex() ||
+                        std::ranges::any_of(renderers, [&](const auto& known) {
                           return picture.writer.ends_with(known);
                         });
   const auto images = images_.find(path);
@@ -189,7 +191,10 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
     if (verdict.state == FileState::unknown) {
       FileToRead file{path};
       file.is_frame = true;
-      for (const BlobRef& image : images) file.expected.push_back(image.digest);
+      for (const BlobRef& image : images) {
+        file.expected.push_back(image.digest);
+        file.sizes.push_back(image.size_bytes);
+      }
       odd.unread.push_back(std::move(file));
     } else if (verdict.state == FileState::unreadable) {
       odd.unreadable = verdict.fault;

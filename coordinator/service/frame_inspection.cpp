@@ -34,7 +34,10 @@ std::vector<FileToRead> files_to_inspect(const Scheduler::Job& job, const FileTa
   std::vector<FileToRead> wanted;
   for_each_finished_frame(job, [&](TaskIndex task, const fs::path& path, const BlobRef& recorded) {
     if (locked.contains(FrameIndex(task))) return;
-    wanted.push_back({path, {recorded.digest}, files.stamp_with(path, recorded.digest)});
+    wanted.push_back({.path = path,
+                      .expected = {recorded.digest},
+                      .known = files.stamp_with(path, recorded.digest),
+                      .sizes = {recorded.size_bytes}});
   });
   return wanted;
 }

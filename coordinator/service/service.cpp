@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/build.h"
+#include "common/base/legible.h"
 #include "common/base/limits.h"
 #include "common/store/folder_token.h"
 #include "coordinator/service/evidence.h"
@@ -121,7 +122,8 @@ Status Service::turn() {
   const auto until_tick = std::chrono::ceil<std::chrono::milliseconds>(next_tick_ - Clock::now());
   std::chrono::milliseconds timeout = std::clamp(until_tick, std::chrono::milliseconds(0), kTick);
   if (!farm_.garbage.empty()) timeout = std::chrono::milliseconds(0);
-  for (int i = 0; i < kMaxMessagesPerTurn; ++i) {
+  const auto until = Clock::now() + std::max(timeout, kTick);
+  for (int i = 0; i < kMaxMessagesPerTurn && Clock::now() < until; ++i) {
     const std::optional<Incoming> incoming = farm_.router.receive(timeout);
     if (!incoming) break;
     BATON_TRY(handle(*incoming));
@@ -336,7 +338,7 @@ Status Service::receive_from(const std::string& worker, const LeaseReturn& messa
   const auto hindrance =
       message.unseen.empty() ? std::nullopt : find_hindrance(farm_, message.lease);
   if (hindrance) return wait_for_disk(farm_, worker, message.lease, *hindrance, message.unseen);
-  const std::string unseen = message.unseen.substr(0, limits::kMaxTextLength);
+  const std::string unseen = legible_line(message.unseen.substr(0, limits::kMaxTextLength));
   if (!unseen.empty())
     tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,
                      farm_.history.name_of(message.lease.job), unseen));

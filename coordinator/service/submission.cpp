@@ -470,7 +470,9 @@ Status Submission::take_over(const Heritage& heritage, const std::string& text, 
 
   if (text.empty()) {
     BATON_TRY(farm_.journal.restart_job(event.job));
-    for (const FrameIndex frame : adoption.lost)
+    // Where nothing of the job itself was looked at, its files may still be there.
+    const bool was_asked = std::ranges::find(heritage.formers, event.job) != heritage.formers.end();
+    for (const FrameIndex frame : was_asked ? adoption.lost : std::vector<FrameIndex>())
       BATON_TRY(farm_.journal.record_frame_file(event.job, frame, std::nullopt));
   } else {
     BATON_TRY(

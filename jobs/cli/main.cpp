@@ -7,6 +7,7 @@
 
 #include "common/base/build.h"
 #include "common/base/command_pages.h"
+#include "common/base/legible.h"
 #include "common/base/log.h"
 #include "common/base/option_values.h"
 #include "common/base/settings.h"
@@ -17,7 +18,7 @@ namespace baton {
 
 ExitCode finish(const Result<ExitCode>& outcome) {
   if (outcome) return *outcome;
-  fmt::print(stderr, "{}\n", outcome.error().message);
+  fmt::print(stderr, "{}\n", legible_text(outcome.error().message));
   return exit_code_of(outcome.error().kind);
 }
 

@@ -150,6 +150,26 @@ def frames_before_another_set_took_over_stay(programs, folder):
     check_equal(len(makers), 1, "renderers")
 
 
+def what_begins_again_may_be_edited(programs, folder):
+    """Frames of its former life are its own, by whichever set they are."""
+    sets = sets_of(programs)
+    if len(sets) < 2:
+        return
+    with Farm(programs, folder / "farm") as farm:
+        worker = farm.start_worker(extra=("--isa", sets[-1]))
+        ident = farm.submit(make(folder))
+        wait_until((folder / "frames/frame.0001.exr").exists, "the first frame is written")
+        worker.terminate()
+        worker.wait()
+        farm.start_worker(extra=("--isa", sets[0]))
+        wait_until(lambda: farm.coordinator.log().count("joined") == 2, "it is there")
+        farm.baton("job", "submit", folder / "job.json", "--restart")
+        farm.baton("job", "submit", make(folder, frames="1-2"))
+        farm.wait_for(ident)
+        makers = {renderer_of(frame) for frame in (folder / "frames").glob("*.exr")}
+        check_equal(len(makers), 1, "renderers")
+
+
 def frames_of_another_coordinators_set_stay(programs, folder):
     """The same document, rendered there with another instruction set: only --restart replaces them."""
     sets = sets_of(programs)

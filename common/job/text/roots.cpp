@@ -24,12 +24,38 @@ fs::path resolve(const fs::path& path) {
   return error ? fs::path() : resolved;
 }
 
-Status check_path(const fs::path& path, const char* what, const Roots& roots) {
-  if (lies_within(path, roots)) return {};
-  const fs::path resolved = resolve(path);
-  const std::string leads = resolved == path.lexically_normal() ? ""
-                            : resolved.empty()                  ? " (a link that leads nowhere)"
-                                               : fmt::format(" (which is {})", resolved.string());
+/// A path has no more parts: each is looked at.
+constexpr std::ptrdiff_t kMaxParts = 128;
+
+std::vector<fs::path> resolved(const Roots& roots) {
+  std::vector<fs::path> folders;
+  for (const fs::path& root : roots) {
+    if (fs::path folder = resolve(root); !folder.empty()) folders.push_back(std::move(folder));
+  }
+  return folders;
+}
+
+/// folders: resolved.
+bool is_below(const fs::path& path, const std::vector<fs::path>& folders) {
+  if (std::distance(path.begin(), path.end()) > kMaxParts) return false;
+  const fs::path found = resolve(path);
+  return !found.empty() && std::ranges::any_of(folders, [&](const fs::path& folder) {
+    return std::mismatch(folder.begin(), folder.end(), found.begin(), found.end()).first ==
+           folder.end();
+  });
+}
+
+/// folders: the roots, resolved.
+Status check_path(const fs::path& path, const char* what, const Roots& roots,
+                  const std::vector<fs::path>& folders) {
+  if (roots.empty() || is_below(path, folders)) return {};
+  if (std::distance(path.begin(), path.end()) > kMaxParts)
+    return Error{ErrorKind::bad_input, fmt::format("{} {}... has more than {} folders", what,
+                                                   path.string().substr(0, 80), kMaxParts)};
+  const fs::path found = resolve(path);
+  const std::string leads = found == path.lexically_normal() ? ""
+                            : found.empty()                  ? " (a link that leads nowhere)"
+                                            : fmt::format(" (which is {})", found.string());
   std::vector<std::string> names;
   for (const fs::path& root : roots) names.push_back(root.string());
   return Error{ErrorKind::bad_input,
@@ -40,23 +66,18 @@ Status check_path(const fs::path& path, const char* what, const Roots& roots) {
 }  // namespace
 
 bool lies_within(const fs::path& path, const Roots& roots) {
-  if (roots.empty()) return true;
-  const fs::path resolved = resolve(path);
-  return !resolved.empty() && std::any_of(roots.begin(), roots.end(), [&](const fs::path& root) {
-    const fs::path folder = resolve(root);
-    if (folder.empty()) return false;
-    return std::mismatch(folder.begin(), folder.end(), resolved.begin(), resolved.end()).first ==
-           folder.end();
-  });
+  return roots.empty() || is_below(path, resolved(roots));
 }
 
 Status check_output_root(const JobSpec& job, const Roots& roots) {
-  return check_path(job.output.directory, "output.directory", roots);
+  return check_path(job.output.directory, "output.directory", roots, resolved(roots));
 }
 
 Status check_roots(const ParsedJobDocument& document, const Roots& roots) {
-  BATON_TRY(check_output_root(document.job, roots));
-  for (const AssetDigest& asset : document.assets) BATON_TRY(check_path(asset.path, "file", roots));
+  const std::vector<fs::path> folders = resolved(roots);
+  BATON_TRY(check_path(document.job.output.directory, "output.directory", roots, folders));
+  for (const AssetDigest& asset : document.assets)
+    BATON_TRY(check_path(asset.path, "file", roots, folders));
   return {};
 }
 

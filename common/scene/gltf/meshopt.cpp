@@ -44,6 +44,11 @@ void decode_meshopt_view(const JsonView& extension, ByteView bytes, Document& do
         fmt::format("{} elements of {} bytes, mode \"{}\", filter \"{}\": expected "
                     "a layout of the extension",
                     layout.count, layout.stride, mode, filter));
+  // What it is packed to is at least a 64th, and a few bytes.
+  constexpr std::uint64_t kMostGrowth = 256, kFew = 1 << 16;
+  if (layout.count * layout.stride > kMostGrowth * bytes.size() + kFew)
+    return extension.fail(fmt::format("{} elements of {} bytes in {}: it is cut or damaged",
+                                      layout.count, layout.stride, bytes.size()));
   Bytes decoded(layout.count * layout.stride);
   if (decode(mode, layout, bytes, decoded) != 0) return extension.fail("its data is damaged");
   if (filter == "OCTAHEDRAL") meshopt_decodeFilterOct(decoded.data(), layout.count, layout.stride);

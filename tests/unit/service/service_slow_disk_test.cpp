@@ -260,6 +260,31 @@ TEST_F(FileTableTest, ADateInTheFutureHidesNoChange) {
   EXPECT_EQ(table.judge(file, frame).state, FileState::unknown);
 }
 
+// It takes no disk, and would take the coordinator's memory.
+TEST_F(FileTableTest, AHugeFileOfASizeThatNoFrameHasIsNotRead) {
+  write("bytes");
+  fs::resize_file(file, FileToRead::kMaxStrangeBytes + 1);
+  int reads = 0;
+  Disk disk;
+  disk.read = [&](const fs::path&) -> Result<Bytes> {
+    ++reads;
+    return Bytes();
+  };
+  disk.picture_writer = [](const std::string&, const Bytes&) {
+    return std::optional<std::string>();
+  };
+  FileReader reader(disk, [] {});
+  FileToRead frame_file{.path = file, .is_frame = true};
+  for (const bool has_size : {false, true}) {
+    if (has_size) frame_file.sizes = {FileToRead::kMaxStrangeBytes + 1};
+    ASSERT_TRUE(reader.request(InspectionOf{}, {frame_file}));
+    std::vector<FilesRead> read;
+    while (read.empty()) read = reader.take();
+    EXPECT_EQ(reads, has_size ? 1 : 0);
+    EXPECT_EQ(read.front().contents.front().fault.empty(), has_size);
+  }
+}
+
 TEST_F(FileTableTest, WhatCannotBeReadIsNeitherThereNorGone) {
   FileTable table;
   write("bytes");
