@@ -48,18 +48,6 @@ Result<std::optional<std::string>> read_if_there(const std::filesystem::path& fi
   return Error{ErrorKind::io, found.error().message};
 }
 
-Result<std::string> look_after_token(const std::filesystem::path& file, const std::string& token) {
-  BATON_ASSIGN(const std::optional<std::string> found, read_if_there(file));
-  if (found && *found == token) return std::string();
-  if (found && found->starts_with(token + "\n")) return found->substr(token.size() + 1);
-  return Error{
-      ErrorKind::io,
-      fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "
-                  "say where it is with --map",
-                  file.parent_path().string(), file.filename().string(),
-                  found ? "has another token" : "no such file")};
-}
-
 }  // namespace
 
 Result<bool> has_token(const std::filesystem::path& file, const std::string& token) {
@@ -69,9 +57,24 @@ Result<bool> has_token(const std::filesystem::path& file, const std::string& tok
 
 Result<std::string> read_after_token(const std::filesystem::path& file, const std::string& token,
                                      Patience* patience) {
-  // What another machine has written may be seen here later.
-  const auto look = [&] { return look_after_token(file, token); };
-  return patience != nullptr ? patiently(look, *patience) : look();
+  for (;;) {
+    const Result<std::optional<std::string>> read = read_if_there(file);
+    const std::optional<std::string> found = read ? *read : std::optional<std::string>();
+    if (found && *found == token) return std::string();
+    if (found && found->starts_with(token + "\n")) return found->substr(token.size() + 1);
+    // What another machine has written may be seen here later.
+    const Error waits_for =
+        read ? Error{ErrorKind::io, file.string() + ", as the coordinator has written it"}
+             : read.error();
+    if (patience != nullptr && patience->wait_after(waits_for)) continue;
+    if (!read) return read.error();
+    return Error{
+        ErrorKind::io,
+        fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "
+                    "say where it is with --map",
+                    file.parent_path().string(), file.filename().string(),
+                    found ? "has another token" : "no such file")};
+  }
 }
 
 Status expect_token(const std::filesystem::path& file, const std::string& token,
