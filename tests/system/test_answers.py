@@ -98,8 +98,9 @@ def who_works_on_what_and_who_is_gone(programs, folder):
     with Farm(programs, folder / "farm") as farm:
         blind = farm.start_worker(name="blind", extra=["--map", f"{folder}/shot/frames={folder}/nowhere"])
         shot = submit(farm, folder, "shot", slow=True)
-        worker = wait_until(lambda: next((w for w in ask(farm, "worker", "list") if w["blindTo"]), None), "a worker is blind")
-        check_equal((worker["id"], worker["activity"]), ("blind", "idle"), "the blind worker")
+        worker = wait_until(lambda: next((w for w in ask(farm, "worker", "list") if w["blindTo"] and w["activity"] == "idle"), None),
+                            "a worker is blind, and has given back what it had")
+        check_equal(worker["id"], "blind", "the blind worker")
         check_equal(worker["blindTo"][0]["job"], shot, "blind to")
         check_says(listed(farm, shot)["reason"], "worker blind does not see", str(folder))
         check_equal(kinds(ask(farm, "worker", "why", "blind")), ["blind"], "why it does nothing")
