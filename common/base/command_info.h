@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,17 @@ struct CommandInfo {
   std::vector<OptionInfo> options;
   std::vector<CommandInfo> commands;
 };
+
+/// The variables of the environment that stand in for options, each with the commands and options
+/// that it stands in for: "baton job list --key".
+inline void add_variables(const CommandInfo& command,
+                          std::map<std::string, std::vector<std::string>>& variables) {
+  for (const OptionInfo& option : command.options) {
+    if (!option.variable.empty())
+      variables[option.variable].push_back(command.name + " " + option.names.back());
+  }
+  for (const CommandInfo& each : command.commands) add_variables(each, variables);
+}
 
 /// "TEXT:{a,b}" has choices.
 inline std::vector<std::string> choices_in(const std::string& type) {

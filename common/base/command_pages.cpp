@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdio>
+#include <functional>
 #include <map>
+
 namespace baton {
 namespace {
 
@@ -51,14 +53,6 @@ void add_command(const CommandInfo& command, std::string& page) {
   for (const CommandInfo& each : command.commands) add_command(each, page);
 }
 
-/// Which commands have an option that a variable stands in for.
-void add_variables(const CommandInfo& command, std::map<std::string, std::string>& variables) {
-  for (const OptionInfo& option : command.options) {
-    if (!option.variable.empty()) variables.emplace(option.variable, option.names.back());
-  }
-  for (const CommandInfo& each : command.commands) add_variables(each, variables);
-}
-
 // ---- completion ---------------------------------------------------------------------------------
 
 /// In single quotes of a shell.
@@ -88,14 +82,30 @@ void flatten(const CommandInfo& command, std::vector<const CommandInfo*>& all) {
   for (const CommandInfo& each : command.commands) flatten(each, all);
 }
 
-/// Arms of a `case` over command and word: those words that lead on to a command, and options
-/// before a choice.
-std::string steps_text(const std::vector<const CommandInfo*>& commands) {
+/// The lines of both shells that find out which command the words before this one name, and offer
+/// the choices of an option behind it. open: what begins an arm of a `case`. offer: the line that
+/// offers choices, in a shell's words.
+std::string walk_text(const std::vector<const CommandInfo*>& commands, const std::string& open,
+                      const std::function<std::string(const std::string& choices)>& offer) {
   std::vector<std::string> steps;
+  std::string choices;
   for (const CommandInfo* command : commands) {
     for (const CommandInfo& each : command->commands) steps.push_back(quoted(each.name));
+    for (const OptionInfo& option : command->options) {
+      if (option.choices.empty()) continue;
+      std::vector<std::string> arms;
+      for (const std::string& each : option.names)
+        arms.push_back(quoted(command->name + " " + each));
+      choices += fmt::format("    {}{}) {}; return ;;\n", open, fmt::join(arms, "|"),
+                             offer(fmt::format("{}", fmt::join(option.choices, " "))));
+    }
   }
-  return fmt::format("{}", fmt::join(steps, "|"));
+  std::string text;
+  if (!steps.empty())
+    text = fmt::format("    case \"$at $word\" in\n      {}{}) at=\"$at $word\" ;;\n    esac\n",
+                       open, fmt::join(steps, "|"));
+  return text + "    :\n  done\n  case \"$at $before\" in\n" + choices +
+         "  esac\n  case \"$at\" in\n";
 }
 
 /// What the first line of a text says, to its first sentence.
@@ -112,22 +122,9 @@ _{0}() {{
   for word in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
 )",
                                    name);
-  if (const std::string steps = steps_text(commands); !steps.empty())
-    script +=
-        fmt::format("    case \"$at $word\" in\n      {}) at=\"$at $word\" ;;\n    esac\n", steps);
-  script += "    :\n  done\n  case \"$at $before\" in\n";
-  for (const CommandInfo* command : commands) {
-    for (const OptionInfo& option : command->options) {
-      if (option.choices.empty()) continue;
-      std::vector<std::string> arms;
-      for (const std::string& each : option.names)
-        arms.push_back(quoted(command->name + " " + each));
-      script += fmt::format("    {}) COMPREPLY=($(compgen -W {} -- \"$current\")); return ;;\n",
-                            fmt::join(arms, "|"),
-                            quoted(fmt::format("{}", fmt::join(option.choices, " "))));
-    }
-  }
-  script += "  esac\n  case \"$at\" in\n";
+  script += walk_text(commands, "", [](const std::string& choices) {
+    return fmt::format("COMPREPLY=($(compgen -W {} -- \"$current\"))", quoted(choices));
+  });
   for (const CommandInfo* command : commands) {
     script += fmt::format("    {}) commands={} options={} ;;\n", quoted(command->name),
                           quoted(fmt::format("{}", fmt::join(words_of(*command), " "))),
@@ -160,21 +157,8 @@ _{0}() {{
   for word in ${{words[2,CURRENT-1]}}; do
 )",
                                    name);
-  if (const std::string steps = steps_text(commands); !steps.empty())
-    script +=
-        fmt::format("    case \"$at $word\" in\n      ({}) at=\"$at $word\" ;;\n    esac\n", steps);
-  script += "    :\n  done\n  case \"$at $before\" in\n";
-  for (const CommandInfo* command : commands) {
-    for (const OptionInfo& option : command->options) {
-      if (option.choices.empty()) continue;
-      std::vector<std::string> arms;
-      for (const std::string& each : option.names)
-        arms.push_back(quoted(command->name + " " + each));
-      script += fmt::format("    ({}) compadd -- {}; return ;;\n", fmt::join(arms, "|"),
-                            fmt::join(option.choices, " "));
-    }
-  }
-  script += "  esac\n  case \"$at\" in\n";
+  script +=
+      walk_text(commands, "(", [](const std::string& choices) { return "compadd -- " + choices; });
   for (const CommandInfo* command : commands) {
     std::vector<std::string> words, options;
     for (const CommandInfo& each : command->commands)
@@ -220,11 +204,12 @@ std::string manual_page(const CommandInfo& program) {
   for (const CommandInfo& command : program.commands) add_command(command, page);
   if (!program.footer.empty())
     page += fmt::format(".SH NOTES\n.nf\n{}\n.fi\n", roff(program.footer));
+  std::map<std::string, std::vector<std::string>> options;
+  add_variables(program, options);
   std::map<std::string, std::string> variables = {
       {"BATON_LOG", "the least of trace, debug, info, warn, error, off that is logged"}};
-  std::map<std::string, std::string> options;
-  add_variables(program, options);
-  for (const auto& [variable, option] : options) variables[variable] = "stands in for " + option;
+  for (const auto& [variable, of] : options)
+    variables[variable] = "stands in for " + of.front().substr(of.front().rfind(' ') + 1);
   page +=
       ".SH ENVIRONMENT\nWhat is typed goes before the environment, and that before the files "
       "below.\n";

@@ -28,16 +28,6 @@ std::string variable(const char* name) {
   return value != nullptr ? value : "";
 }
 
-void add_variables(const CommandInfo& command, std::map<std::string, Setting>& settings) {
-  for (const OptionInfo& option : command.options) {
-    if (option.variable.empty()) continue;
-    Setting& setting = settings[option.variable];
-    setting.name = option.variable;
-    setting.options.push_back(command.name + " " + option.names.back());
-  }
-  for (const CommandInfo& each : command.commands) add_variables(each, settings);
-}
-
 std::string trimmed(const std::string& text) {
   const char* const blanks = " \t\r";
   const std::size_t from = text.find_first_not_of(blanks);
@@ -113,9 +103,11 @@ std::vector<std::string> settings_files(const std::string& program) {
 }
 
 Result<std::vector<Setting>> take_settings(const CommandInfo& program) {
+  std::map<std::string, std::vector<std::string>> variables = {{kLogLevel, {}}};
+  add_variables(program, variables);
   std::map<std::string, Setting> settings;
-  add_variables(program, settings);
-  settings[kLogLevel].name = kLogLevel;
+  for (auto& [name, options] : variables)
+    settings[name] = {.name = name, .value = {}, .from = {}, .options = std::move(options)};
   for (auto& [name, setting] : settings) {
     const char* const value = std::getenv(name.c_str());
     if (value == nullptr) continue;

@@ -98,6 +98,15 @@ def who_comes_before_a_dead_one_is_missed_is_let_in(programs, folder):
         check(other.alive(), "it was let in")
 
 
+def give_way(farm, worker, isa):
+    """The worker ends, and one of another set takes its place."""
+    joined = farm.coordinator.log().count("joined")
+    worker.terminate()
+    worker.wait()
+    farm.start_worker(extra=("--isa", isa))
+    wait_until(lambda: farm.coordinator.log().count("joined") > joined, "it is there")
+
+
 def what_is_kept_is_by_one(programs, folder):
     """Versions of a job by two instruction sets: the next one goes on from the newest that has frames, with its set."""
     sets = sets_of(programs)
@@ -115,10 +124,7 @@ def what_is_kept_is_by_one(programs, folder):
             worker = farm.start_worker(extra=("--isa", best))
             ident = farm.submit(make(place, **{**small, **first}))
             farm.wait_for(ident)
-            worker.terminate()
-            worker.wait()
-            farm.start_worker(extra=("--isa", least))
-            wait_until(lambda: "joined" in farm.workers[-1].log() or farm.coordinator.log().count("joined") == 2, "it is there")
+            give_way(farm, worker, least)
             farm.baton("job", "submit", make(place, **{**small, **second}), "--restart")
             farm.wait_for(ident)
             refused = farm.baton("job", "submit", make(place, **{**small, **third}), expect=None)
@@ -159,10 +165,7 @@ def what_begins_again_may_be_edited(programs, folder):
         worker = farm.start_worker(extra=("--isa", sets[-1]))
         ident = farm.submit(make(folder))
         wait_until((folder / "frames/frame.0001.exr").exists, "the first frame is written")
-        worker.terminate()
-        worker.wait()
-        farm.start_worker(extra=("--isa", sets[0]))
-        wait_until(lambda: farm.coordinator.log().count("joined") == 2, "it is there")
+        give_way(farm, worker, sets[0])
         farm.baton("job", "submit", folder / "job.json", "--restart")
         farm.baton("job", "submit", make(folder, frames="1-2"))
         farm.wait_for(ident)
@@ -319,10 +322,7 @@ def a_locked_frame_holds_a_job_to_no_renderer(programs, folder):
         farm.wait_for(ident)
         farm.baton("job", "lock", ident, "--frames", "3")
         locked = (folder / "frames/frame.0003.exr").read_bytes()
-        worker.terminate()
-        worker.wait()
-        farm.start_worker(extra=("--isa", sets[0]))
-        wait_until(lambda: farm.coordinator.log().count("joined") == 2, "it is there")
+        give_way(farm, worker, sets[0])
         check_says(farm.baton("job", "submit", folder / "job.json", "--restart").stderr, "nothing is kept of these that was rendered with")
         farm.wait_for(ident)
         check_equal((folder / "frames/frame.0003.exr").read_bytes(), locked, "the locked frame")

@@ -53,6 +53,11 @@ TEST_F(RootsTest, AJobIsRefusedWithThePathAndWhereItLeads) {
   ASSERT_FALSE(asset.ok());
   EXPECT_EQ(asset.error().kind, ErrorKind::bad_input);
   EXPECT_THAT(asset.error().message, HasSubstr((top / "elsewhere/map.hdr").string()));
+  // Each part of a path is looked at: so many that it takes seconds are none of people.
+  std::string deep = (top / "shows").string();
+  for (int i = 0; i < 200; ++i) deep += "/x";
+  document.assets.front().path = deep;
+  EXPECT_THAT(check_roots(document, roots).error().message, HasSubstr("has more than 128 folders"));
   document.job.output.directory = "/etc";
   EXPECT_THAT(check_roots(document, roots).error().message,
               HasSubstr("output.directory /etc lies outside what this farm allows (--root): "));

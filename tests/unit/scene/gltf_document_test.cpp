@@ -138,6 +138,9 @@ TEST(GltfDocument, AbsurdAccessorsAreErrors) {
               HasSubstr("$.accessors[1].count: expected"));
   EXPECT_THAT(error_of_indices(R"("type":"SCALAR","componentType":5123,"count":9007199254740992)"),
               HasSubstr("expected at most"));
+  // Half a gigabyte of nothing, from a file of some hundred bytes.
+  EXPECT_THAT(error_of_indices(R"("type":"SCALAR","componentType":5123,"count":134217728)"),
+              HasSubstr("elements that are not stored, got 134217728"));
   EXPECT_THAT(error_of_indices(R"("bufferView":7,"type":"SCALAR","componentType":5123,"count":3)"),
               HasSubstr("$.accessors[1].bufferView: expected an index below 2, got 7"));
   EXPECT_THAT(error_of_indices(R"("bufferView":1,"type":"SCALAR","componentType":9,"count":3)"),

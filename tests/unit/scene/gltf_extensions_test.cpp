@@ -104,6 +104,9 @@ TEST(GltfExtensions, MeshoptViewsAreDecoded) {
   ASSERT_TRUE(mesh) << mesh.error().message;
   EXPECT_THAT(mesh->positions, testing::Contains(Vec3{0, 0, 2}));
   EXPECT_THAT(load(file(packed, "1e15")).error().message, HasSubstr("expected a layout"));
+  EXPECT_THAT(load(file(packed, "30000000")).error().message,
+              HasSubstr("30000000 elements of 12 bytes in"))
+      << "before a third of a gigabyte is taken for it";
   packed.resize(packed.size() / 2);
   EXPECT_THAT(load(file(packed, "3")).error().message, HasSubstr("its data is damaged"));
 }
