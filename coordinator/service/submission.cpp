@@ -5,14 +5,11 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <map>
 #include <set>
 #include <utility>
 
 #include "common/base/archive.h"
 #include "common/base/limits.h"
-#include "common/base/utc.h"
-#include "common/job/plan/next_sweeps.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "coordinator/service/farm_document.h"

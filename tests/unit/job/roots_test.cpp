@@ -57,7 +57,9 @@ TEST_F(RootsTest, AJobIsRefusedWithThePathAndWhereItLeads) {
   std::string deep = (top / "shows").string();
   for (int i = 0; i < 200; ++i) deep += "/x";
   document.assets.front().path = deep;
-  EXPECT_THAT(check_roots(document, roots).error().message, HasSubstr("has more than 128 folders"));
+  const Status far = check_roots(document, roots);
+  ASSERT_FALSE(far.ok());
+  EXPECT_THAT(far.error().message, HasSubstr("has more than 128 folders"));
   document.job.output.directory = "/etc";
   EXPECT_THAT(check_roots(document, roots).error().message,
               HasSubstr("output.directory /etc lies outside what this farm allows (--root): "));
