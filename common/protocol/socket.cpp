@@ -29,6 +29,7 @@ constexpr int kKeepAliveIdleS = 5, kKeepAliveIntervalS = 2, kKeepAliveProbes = 3
 constexpr int kUnansweredMs = 12000;
 constexpr std::chrono::milliseconds kClosingInterval{100};
 constexpr int kMostFailures = 4;
+constexpr std::chrono::milliseconds kRedialInterval{700};
 
 void set_options(zmq::socket_t& socket, std::chrono::milliseconds linger) {
   socket.set(zmq::sockopt::linger, static_cast<int>(linger.count()));
@@ -96,15 +97,19 @@ struct Socket::Impl {
   bool take_new_key() {
     const Result<std::optional<ClientKey>> found = own_key(endpoint);
     if (!finds_key || !found || *found == found_key) return false;
-    socket.disconnect(endpoint);
     found_key = *found;
-    if (found_key) {
+    redial();
+    return true;
+  }
+  void redial() {
+    socket.disconnect(endpoint);
+    if (finds_key && found_key) {
       use(*found_key);
-    } else {
+    } else if (finds_key) {
       ::zmq_setsockopt(socket.handle(), ZMQ_PLAIN_USERNAME, nullptr, 0);  // none is used
     }
     socket.connect(endpoint);
-    return true;
+    next_dial.reset();
   }
   /// Polled beside the socket itself, which is the first.
   std::vector<zmq::pollitem_t> poll_items(short events) {
@@ -113,6 +118,9 @@ struct Socket::Impl {
     if (doorkeeper) items.push_back({doorkeeper->questions().handle(), 0, ZMQ_POLLIN, 0});
     return items;
   }
+  Clock::time_point next_turn(Clock::time_point deadline) const {
+    return std::min(deadline, next_dial.value_or(deadline));
+  }
   bool is_denied() const {
     return watch.failure() == ConnectionWatch::Failure::denied || num_failed >= kMostFailures;
   }
@@ -120,12 +128,16 @@ struct Socket::Impl {
   bool look_at_connections() {
     if (doorkeeper) doorkeeper->answer();
     bool has_failed = watch.poll();
+    const auto now = Clock::now();
     if (has_failed && take_new_key()) {
       watch.take();
       has_failed = false;
     }
     if (has_failed) ++num_failed;
-    const auto now = Clock::now();
+    // The library gives an endpoint up after a handshake that failed; the coordinator may only have
+    // begun, and its keys be found in a moment.
+    if (has_failed && !is_server) next_dial = now + kRedialInterval;
+    if (next_dial && now >= *next_dial && !take_new_key()) redial();
     if (is_server && now >= next_closing) {
       watch.close_unwelcome();
       next_closing = now + kClosingInterval;
@@ -138,7 +150,7 @@ struct Socket::Impl {
     std::vector<zmq::pollitem_t> items = poll_items(ZMQ_POLLIN);
     items.push_back({nullptr, wake_fd.number(), ZMQ_POLLIN, 0});
     while (true) {
-      if (!poll_until(deadline, items)) return false;
+      if (!poll_until(next_turn(deadline), items)) return false;
       const bool is_woken = (items.back().revents & ZMQ_POLLIN) != 0;
       eventfd_t count = 0;
       if (is_woken) ::eventfd_read(wake_fd.number(), &count);
@@ -158,13 +170,17 @@ struct Socket::Impl {
   bool finds_key = false;              ///< ClientAccess::finds_key
   bool is_server;
   int num_failed = 0;  ///< handshakes
+  std::optional<Clock::time_point> next_dial;
   Clock::time_point next_closing;
 };
 
 void Socket::let_in(const std::map<std::string, Speaker>& known) {
   if (impl_->doorkeeper) impl_->doorkeeper->let_in(known);
 }
-void Socket::hang_up() { impl_->socket.disconnect(impl_->endpoint); }
+void Socket::hang_up() {
+  impl_->socket.disconnect(impl_->endpoint);
+  impl_->next_dial.reset();
+}
 void Socket::dial() { impl_->socket.connect(impl_->endpoint); }
 
 Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -224,12 +240,13 @@ Result<Socket> Socket::bind(const std::string& endpoint, std::chrono::millisecon
 bool Socket::wait_to_send(std::chrono::milliseconds timeout) {
   const auto deadline = Clock::now() + timeout;
   std::vector<zmq::pollitem_t> items = impl_->poll_items(ZMQ_POLLOUT);
-  while (true) {
-    const bool is_signal = !poll_until(deadline, items);
+  while (!impl_->is_denied()) {
+    const bool is_signal = !poll_until(impl_->next_turn(deadline), items);
     if (!is_signal && (items[0].revents & ZMQ_POLLOUT)) return true;
     impl_->look_at_connections();
-    if (Clock::now() >= deadline || impl_->is_denied()) return false;
+    if (Clock::now() >= deadline) return false;
   }
+  return false;
 }
 
 bool Socket::send(const std::vector<Bytes>& frames) {

@@ -20,9 +20,15 @@ inline JobSpec sequence_job(int frames) {
   return job;
 }
 
+/// Nothing is kept from one tile to the next.
+inline MemoryBudget keeping_nothing() {
+  MemoryBudget memory = MemoryBudget::of(0);
+  memory.total_bytes = default_memory_bytes();
+  return memory;
+}
+
 /// All films of a job cut into tiles of `tile_size` and runs of `run_length`, pasted together;
-/// states go through their file form between runs. memory: with MemoryBudget::of(0) nothing is kept
-/// from one tile to the next.
+/// states go through their file form between runs.
 inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length,
                                           const MemoryBudget& memory = MemoryBudget::of_machine()) {
   job.image.tile_size = tile_size;

@@ -42,7 +42,7 @@ TEST(AdaptiveRounds, SameBytesForAnyTilingAndAnyRunLength) {
       if (in_motion) test::set_in_motion(job, true, true);
       const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
       EXPECT_EQ(render_tiled(job, 8, 2), whole) << static_cast<int>(method) << in_motion;
-      EXPECT_EQ(render_tiled(job, 16, 1, MemoryBudget::of(0)), whole)
+      EXPECT_EQ(render_tiled(job, 16, 1, test::keeping_nothing()), whole)
           << static_cast<int>(method) << in_motion;
       const double rounds = mean_rounds(whole.back());
       EXPECT_GT(rounds, 3.2) << "or it would test nothing";

@@ -148,7 +148,7 @@ TEST(FineSites, OfAnyTilingAreTheSame) {
     if (in_motion) test::set_in_motion(job, true, true);
     const auto whole = render_tiled(job, 64, 3);
     EXPECT_EQ(render_tiled(job, 8, 1), whole) << in_motion;
-    EXPECT_EQ(render_tiled(job, 16, 2, MemoryBudget::of(0)), whole) << in_motion;
+    EXPECT_EQ(render_tiled(job, 16, 2, test::keeping_nothing()), whole) << in_motion;
   }
 }
 

@@ -90,7 +90,7 @@ TEST(Primary, SameBytesForAnyTilingWithTextures) {
     if (moves) test::set_in_motion(job, true, true);
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
     EXPECT_EQ(render_tiled(job, 5, 1), whole);
-    EXPECT_EQ(render_tiled(job, 5, 1, MemoryBudget::of(0)), whole);
+    EXPECT_EQ(render_tiled(job, 5, 1, test::keeping_nothing()), whole);
   }
 }
 

@@ -33,7 +33,7 @@ TEST(Rounds, SameBytesForAnyTilingAndAnyRunLength) {
     const JobSpec job = rounds_job(method, 3);
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
     EXPECT_EQ(render_tiled(job, 5, 2), whole) << static_cast<int>(method);
-    EXPECT_EQ(render_tiled(job, 8, 1, MemoryBudget::of(0)), whole) << static_cast<int>(method);
+    EXPECT_EQ(render_tiled(job, 8, 1, test::keeping_nothing()), whole) << static_cast<int>(method);
   }
 }
 
@@ -44,7 +44,7 @@ TEST(Rounds, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
     test::set_in_motion(job, true, true);
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
     EXPECT_EQ(render_tiled(job, 5, 1), whole) << static_cast<int>(method);
-    EXPECT_EQ(render_tiled(job, 8, 2, MemoryBudget::of(0)), whole) << static_cast<int>(method);
+    EXPECT_EQ(render_tiled(job, 8, 2, test::keeping_nothing()), whole) << static_cast<int>(method);
   }
 }
 
@@ -62,7 +62,7 @@ TEST(Rounds, OfLargeTilesHaveTheSameBytes) {
         const std::string what =
             std::to_string(static_cast<int>(method)) + ", " + std::to_string(max_sites);
         EXPECT_EQ(render_tiled(job, 16, 1), whole) << what;
-        EXPECT_EQ(render_tiled(job, 4096, 1, MemoryBudget::of(0)), whole) << what;
+        EXPECT_EQ(render_tiled(job, 4096, 1, test::keeping_nothing()), whole) << what;
       }
     }
   }

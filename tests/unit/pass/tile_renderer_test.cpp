@@ -99,7 +99,7 @@ TEST(RunTile, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
     EXPECT_EQ(render_tiled(job, 8, 2), whole);
     EXPECT_EQ(render_tiled(job, 3, 1), whole);
-    EXPECT_EQ(render_tiled(job, 8, 1, MemoryBudget::of(0)), whole) << "nothing is kept";
+    EXPECT_EQ(render_tiled(job, 8, 1, test::keeping_nothing()), whole) << "nothing is kept";
   }
 }
 
