@@ -109,12 +109,29 @@ Status sync_folder(const fs::path& folder) { return sync_path(folder, O_RDONLY |
 
 namespace {
 
+/// Error (bad_input): a folder that is held open is in none of these, wherever it was found.
+Status expect_within(const FileDescriptor& folder, const Roots& roots) {
+  if (roots.empty()) return {};
+  std::error_code error;
+  const fs::path found = fs::read_symlink(fmt::format("/proc/self/fd/{}", folder.number()), error);
+  for (const fs::path& root : roots) {
+    std::error_code none;
+    const fs::path within = fs::canonical(root, none);
+    const auto [end, rest] =
+        std::mismatch(within.begin(), within.end(), found.begin(), found.end());
+    if (!error && !none && end == within.end()) return {};
+  }
+  return Error{ErrorKind::bad_input,
+               fmt::format("{}: lies outside what this farm allows (--root)", found.string())};
+}
+
 /// A new file beside `path` under a name that nobody can foresee, so that no link can lie in wait
 /// for it. It goes away unless it is published.
 class NewFile {
  public:
   /// Creates missing folders.
-  static Result<NewFile> create(const fs::path& path, mode_t rights = 0644) {
+  static Result<NewFile> create(const fs::path& path, mode_t rights = 0644,
+                                const Roots& roots = {}) {
     std::error_code error;
     if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
     if (error) {
@@ -124,6 +141,7 @@ class NewFile {
     const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
     FileDescriptor held(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (!held) return io_error("cannot open", folder);
+    BATON_TRY(expect_within(held, roots));
     std::random_device random;
     for (int attempt = 0;; ++attempt) {
       const std::string name = fmt::format(".{}.{:08x}{:08x}.tmp", path.filename().string(),
@@ -196,8 +214,8 @@ class NewFile {
 
 }  // namespace
 
-Status write_file_atomic(const fs::path& path, ByteView bytes) {
-  BATON_ASSIGN(NewFile file, NewFile::create(path));
+Status write_file_atomic(const fs::path& path, ByteView bytes, const Roots& roots) {
+  BATON_ASSIGN(NewFile file, NewFile::create(path, 0644, roots));
   BATON_TRY(file.write(bytes));
   BATON_TRY(file.sync());
   BATON_TRY(file.publish());
@@ -220,8 +238,8 @@ Status expect_content(const fs::path& path, ByteView bytes) {
 
 Result<bool> write_file_verified(
     const fs::path& path, ByteView bytes,
-    const std::function<Result<bool>(const fs::path& temporary)>& may_replace) {
-  BATON_ASSIGN(NewFile file, NewFile::create(path));
+    const std::function<Result<bool>(const fs::path& temporary)>& may_replace, const Roots& roots) {
+  BATON_ASSIGN(NewFile file, NewFile::create(path, 0644, roots));
   BATON_TRY(file.write(bytes));
   BATON_TRY(file.sync());
   BATON_TRY(expect_content(file.path(), bytes));

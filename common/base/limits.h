@@ -14,11 +14,9 @@ inline constexpr std::uint64_t kMaxMessageBytes = 64ull << 20;
 inline constexpr std::uint64_t kMaxWorkerMessageBytes = 8ull << 20;  // what a worker says
 /// Bytes from one connection without the end of a message.
 inline constexpr std::uint64_t kMaxUnendedBytes = 2 * kMaxMessageBytes;
-/// What may wait for one connection to be read, beside one message, and for all together. Of
-/// messages of more than kSmallMessageBytes, which the number of those that wait limits.
+/// What may wait for one connection to be read, beside one message, and for all together.
 inline constexpr std::uint64_t kMaxUnreadBytes = kMaxMessageBytes;
 inline constexpr std::uint64_t kMaxUnreadBytesInAll = 8 * kMaxMessageBytes;
-inline constexpr std::uint64_t kSmallMessageBytes = 16 << 10;
 /// Of one address, that have said nothing for kSilenceAllowed since they were made.
 inline constexpr int kMaxSilentConnections = 64;
 /// Of the programs that `baton render` and `farm slurm` start; then it is begun anew.

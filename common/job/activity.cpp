@@ -20,7 +20,8 @@ std::string_view job_activity_name(JobActivity activity) {
 }
 
 std::string_view worker_activity_name(WorkerActivity activity) {
-  constexpr std::array<std::string_view, 4> kNames{"idle", "rendering", "draining", "silent"};
+  constexpr std::array<std::string_view, 5> kNames{"idle", "rendering", "draining", "silent",
+                                                   "held"};
   return name_of(kNames, activity);
 }
 

@@ -32,9 +32,10 @@ enum class WorkerActivity : std::uint8_t {
   rendering = 1,
   draining = 2,  ///< it takes nothing new, and will end
   silent = 3,    ///< no sign of life for two heartbeats
+  held = 4,      ///< takes nothing until it is released
 };
-constexpr WorkerActivity last_of(WorkerActivity) { return WorkerActivity::silent; }
-/// "idle" ... "silent".
+constexpr WorkerActivity last_of(WorkerActivity) { return WorkerActivity::held; }
+/// "idle" ... "held".
 std::string_view worker_activity_name(WorkerActivity activity);
 
 /// Why a worker is not here. Sent; values are for ever.
@@ -56,10 +57,20 @@ struct UsualTime {
   bool operator==(const UsualTime&) const = default;
 };
 
+/// When a job will be done, in seconds from now: one in ten is by `early_s`, half are by
+/// `likely_s`, nine in ten by `late_s`. All 0: that is not known.
+struct Eta {
+  double early_s = 0, likely_s = 0, late_s = 0;
+
+  bool is_known() const { return late_s > 0; }
+  bool operator==(const Eta&) const = default;
+};
+
 /// What a job does, and for what it waits, if it does; empty: for nothing.
 struct JobNow {
   JobActivity activity = JobActivity::queued;
   std::string reason = {};
+  Eta eta = {};
 
   bool operator==(const JobNow&) const = default;
 };

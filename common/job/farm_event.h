@@ -38,9 +38,11 @@ enum class FarmEventKind : std::uint8_t {
   frames_locked = 21,
   frames_unlocked = 22,
   priority_changed = 23,
+  worker_held = 24,  ///< takes nothing new until it is released
+  worker_released = 25,
 };
-constexpr FarmEventKind last_of(FarmEventKind) { return FarmEventKind::priority_changed; }
-/// "coordinator started" ... "priority changed".
+constexpr FarmEventKind last_of(FarmEventKind) { return FarmEventKind::worker_released; }
+/// "coordinator started" ... "worker released".
 std::string_view farm_event_name(FarmEventKind kind);
 
 /// A task as people see it: which frames, which tile.

@@ -115,28 +115,37 @@ void ConnectionWatch::note_message(const zmq::message_t& frame, const Bytes& pee
 
 bool ConnectionWatch::take_place(const Bytes& peer, std::uint64_t size_bytes) {
   const auto known = peers_.find(peer);
-  if (size_bytes <= limits::kSmallMessageBytes || known == peers_.end()) return true;
-  std::uint64_t in_all = size_bytes;
-  for (auto& [descriptor, connection] : connections_) {
-    // The library writes as long as the system takes it: where nothing waits there, nothing waits.
-    if (connection.unread > 0 && unsent_bytes(descriptor) == 0) connection.unread = 0;
-    in_all += connection.unread;
-  }
+  if (known == peers_.end()) return true;
   Connection& connection = connections_.at(known->second);
-  const bool has_room = connection.unread + size_bytes <= limits::kMaxUnreadBytes &&
-                        in_all <= limits::kMaxUnreadBytesInAll;
-  if (connection.unread > 0 && !has_room) return false;
+  const auto has_room = [&] {
+    return connection.unread + size_bytes <= limits::kMaxUnreadBytes &&
+           unread_in_all_ + size_bytes <= limits::kMaxUnreadBytesInAll;
+  };
+  if (!has_room()) count_unread();
+  if (connection.unread > 0 && !has_room()) return false;
   connection.unread += size_bytes;
+  unread_in_all_ += size_bytes;
   return true;
+}
+
+/// The library writes as long as the system takes it: where nothing waits there, nothing waits.
+void ConnectionWatch::count_unread() {
+  unread_in_all_ = 0;
+  for (auto& [descriptor, connection] : connections_) {
+    if (connection.unread > 0 && unsent_bytes(descriptor) == 0) connection.unread = 0;
+    unread_in_all_ += connection.unread;
+  }
 }
 
 ConnectionWatch::Connections::iterator ConnectionWatch::forget(Connections::iterator connection) {
   peers_.erase(connection->second.peer);
+  unread_in_all_ -= connection->second.unread;
   return connections_.erase(connection);
 }
 
 void ConnectionWatch::close_unwelcome() {
   constexpr std::uint64_t kMaxUnendedInAll = 4 * limits::kMaxUnendedBytes;
+  count_unread();
   const auto silent_since = std::chrono::steady_clock::now() - limits::kSilenceAllowed;
   std::map<std::string, int> silent;
   std::multimap<std::uint64_t, int, std::greater<>> unended;  // the most first

@@ -76,10 +76,12 @@ class ConnectionWatch {
   void note(Failure failure);
   void close(int descriptor, Failure failure);
   Connections::iterator forget(Connections::iterator connection);
+  void count_unread();
 
   zmq::socket_t& watched_;
   zmq::socket_t events_;
   Connections connections_;
+  std::uint64_t unread_in_all_ = 0;
   std::map<Bytes, int> peers_;  ///< their connections
   std::optional<Failure> failure_;
   bool was_connected_ = false;

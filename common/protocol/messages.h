@@ -21,7 +21,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 17;
+inline constexpr std::uint16_t kProtocolVersion = 18;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.
@@ -144,8 +144,17 @@ struct PauseJob {
 struct ResumeJob {
   std::string job;
 };
-struct DrainWorker {
+/// Sent; values are for ever.
+enum class WorkerOrder : std::uint8_t {
+  drain = 0,  ///< to finish what it renders, and end
+  /// To finish what it has, and take nothing new until it is released.
+  hold = 1,
+  release = 2,  ///< to take tasks again
+};
+constexpr WorkerOrder last_of(WorkerOrder) { return WorkerOrder::release; }
+struct OrderWorker {
   std::string worker_id;
+  WorkerOrder order = WorkerOrder::drain;
 };
 struct CancelJob {
   std::string job;
@@ -223,6 +232,8 @@ struct WorkerSummary {
   std::vector<TaskInHand> tasks = {};  ///< those that it has had for longest first
   /// It was told to finish and to take nothing new.
   bool is_draining = false;
+  /// It takes nothing new until it is released.
+  bool is_held = false;
   WorkerActivity activity = WorkerActivity::idle;
   double silent_s = 0;  ///< since its last sign of life
   std::string build = {}, renderer = {};
@@ -320,7 +331,7 @@ using Message =
     std::variant<WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed, JobDocumentRequest,
                  WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain,
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
-                 JobAccepted, JobList, ShownJob, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
+                 JobAccepted, JobList, ShownJob, Refused, PauseJob, ResumeJob, OrderWorker, Drain,
                  ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates, BlobsLeft,
                  ListEvents, EventList, LockFrames, SetPriority, AskWhy, ReasonChain, ListTasks,
                  TaskList>;

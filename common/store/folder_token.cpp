@@ -31,9 +31,9 @@ Result<std::string> make_token(const std::filesystem::path& file, const std::str
 }
 
 Status write_token(const std::filesystem::path& file, const std::string& token,
-                   const std::string& line) {
+                   const std::string& line, const Roots& roots) {
   const std::string text = line.empty() ? token : token + "\n" + line;
-  return write_file_atomic(file, as_bytes_view(text));
+  return write_file_atomic(file, as_bytes_view(text), roots);
 }
 
 namespace {

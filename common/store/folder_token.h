@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/base/digest.h"
+#include "common/base/files.h"
 #include "common/base/patiently.h"
 #include "common/base/result.h"
 
@@ -20,9 +21,9 @@ std::filesystem::path output_token_file(const std::filesystem::path& folder, con
 /// The token in `file`; where there is none yet, `known` or, if that is empty, a new random one (16
 /// hex digits).
 Result<std::string> make_token(const std::filesystem::path& file, const std::string& known = {});
-/// Writes a token that is known, and a line after it, if there is one.
+/// Writes a token that is known, and a line after it, if there is one; in one of `roots`.
 Status write_token(const std::filesystem::path& file, const std::string& token,
-                   const std::string& line = {});
+                   const std::string& line = {}, const Roots& roots = {});
 /// The line after the token; empty: there is none. The error, io, says that the token does not
 /// stand there and names the folder of `file`, or why the file cannot be read; with patience that
 /// is looked at again.

@@ -46,7 +46,8 @@ Result<FolderLocks> read_locks(const fs::path& file) {
 
 fs::path lock_folder(const fs::path& folder) { return folder / ".baton-locked"; }
 
-Status record_locks(const fs::path& folder, const std::string& job, const FolderLocks& locks) {
+Status record_locks(const fs::path& folder, const std::string& job, const FolderLocks& locks,
+                    const Roots& roots) {
   const fs::path file = lock_folder(folder) / job;
   BATON_ASSIGN(const FolderLocks before, read_locks(file));
   if (locks == before) return {};
@@ -64,17 +65,17 @@ Status record_locks(const fs::path& folder, const std::string& job, const Folder
   for (const std::string& name : locks.files) text += name + "\n";
   Status written;
   for (int i = 0; i < kMostTries; ++i) {
-    written = write_file_atomic(file, as_bytes_view(text));
+    written = write_file_atomic(file, as_bytes_view(text), roots);
     if (written) break;
   }
   return written;
 }
 
 Status retain_locks(const fs::path& folder, const std::string& job,
-                    const std::set<std::string>& files) {
+                    const std::set<std::string>& files, const Roots& roots) {
   BATON_ASSIGN(FolderLocks locks, read_locks(lock_folder(folder) / job));
   std::erase_if(locks.files, [&](const std::string& name) { return !files.contains(name); });
-  return record_locks(folder, job, locks);
+  return record_locks(folder, job, locks, roots);
 }
 
 Result<std::map<std::string, FolderLocks>> locks_by_job(const fs::path& folder) {

@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "common/base/files.h"
 #include "common/base/result.h"
 
 namespace baton {
@@ -27,13 +28,13 @@ struct FolderLocks {
 
 /// Replaces what the folder says of a job, which is named by its ID; without files its own goes,
 /// and with the last one lock_folder(). Errors, io: the disk; there is something to say, and
-/// `folder` is not there.
+/// `folder` is not there; bad_input: it is in none of `roots`.
 Status record_locks(const std::filesystem::path& folder, const std::string& job,
-                    const FolderLocks& locks);
+                    const FolderLocks& locks, const Roots& roots = {});
 
 /// Forgets what the folder says of a job but these; the time stays. Errors as above.
 Status retain_locks(const std::filesystem::path& folder, const std::string& job,
-                    const std::set<std::string>& files);
+                    const std::set<std::string>& files, const Roots& roots = {});
 
 /// By the jobs' IDs. Errors, io: that cannot be read now.
 Result<std::map<std::string, FolderLocks>> locks_by_job(const std::filesystem::path& folder);

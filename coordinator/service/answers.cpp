@@ -33,7 +33,8 @@ std::string names_text(const std::vector<std::string>& workers) {
 Conduct conduct_of(const FarmCore& farm) {
   Conduct conduct{.silent_after = 2 * farm.options.heartbeat};
   for (const WorkerSummary& worker : farm.peers.summaries()) {
-    if (worker.is_draining) conduct.draining.insert(worker.worker_id);
+    if (worker.is_draining || farm.history.past().is_held(worker.worker_id))
+      conduct.draining.insert(worker.worker_id);
   }
   return conduct;
 }
@@ -109,6 +110,7 @@ JobNow Answers::now_of(const Digest& version, JobStatus status) const {
   }
   if (farm_.scheduler.leases().any_of(version) != nullptr) {
     now.activity = JobActivity::rendering;
+    now.eta = eta_of(version);
     return now;
   }
   const std::vector<Cause> chain = reasons_.of_job(version);
@@ -121,10 +123,21 @@ JobNow Answers::now_of(const Digest& version, JobStatus status) const {
              last.kind == ReasonKind::running) {
     const auto busy = std::ranges::find(chain, ReasonKind::busy, &Cause::kind);
     now.reason = busy == chain.end() ? std::string() : busy_text(*busy);
+    now.eta = eta_of(version);
   } else {
     now = {JobActivity::waiting, text_of(last)};
   }
   return now;
+}
+
+Eta Answers::eta_of(const Digest& version) const {
+  int num_slots = 0;
+  for (const WorkerSummary& worker : farm_.peers.summaries()) {
+    // One task waits at each for a thread (Session::request_leases), and counts as in work.
+    const bool takes = !worker.is_draining && !farm_.history.past().is_held(worker.worker_id);
+    if (takes) num_slots += worker.num_threads + 1;
+  }
+  return farm_.history.etas().of(version, farm_.scheduler, num_slots, now_);
 }
 
 Result<ReasonChain> Answers::why_job(const Digest& version, JobStatus status,
@@ -204,8 +217,10 @@ WorkerSummary Answers::describe(WorkerSummary worker) const {
   }
   if (!leases.knows(name)) return worker;
   worker.silent_s = leases.silence_of(name, now_).count();
+  worker.is_held = farm_.history.past().is_held(name);
   worker.activity = reasons_.is_silent(name) ? WorkerActivity::silent
                     : worker.is_draining     ? WorkerActivity::draining
+                    : worker.is_held         ? WorkerActivity::held
                     : worker.tasks.empty()   ? WorkerActivity::idle
                                              : WorkerActivity::rendering;
   return worker;
@@ -386,6 +401,11 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::ended:
       return fmt::format("{} is {}", cause.task ? place(cause) : "the job", cause.text);
     case ReasonKind::draining:
+      if (std::ranges::any_of(cause.workers, [this](const std::string& worker) {
+            return farm_.history.past().is_held(worker);
+          }))
+        return fmt::format("{} {} held, and {} nothing new", who, many ? "are" : "is",
+                           many ? "take" : "takes");
       return fmt::format("{} {}, and {} nothing new", who,
                          many ? "finish what they have" : "finishes what it has",
                          many ? "take" : "takes");

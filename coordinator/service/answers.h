@@ -30,6 +30,7 @@ class Answers {
 
  private:
   Result<std::vector<Cause>> causes_of(const Digest& version, const AskWhy& question) const;
+  Eta eta_of(const Digest& version) const;
   Reason reason_of(const Cause& cause) const;
   WorkerSummary describe(WorkerSummary worker) const;
   Reason end_reason(const Digest& version, JobStatus status) const;

@@ -13,6 +13,9 @@
 namespace baton {
 namespace {
 
+constexpr std::string_view kFirstColumns = "frame,tile,pixels,";
+constexpr std::uint64_t kMaxDiagnosticsBytes = 1ull << 30;
+
 /// quality: of a frame that is written; else its columns stay empty.
 std::string line(FrameNumber frame_number, const std::string& tile, const SamplingStats& s,
                  const FrameQuality& quality = {}) {
@@ -33,7 +36,8 @@ std::string line(FrameNumber frame_number, const std::string& tile, const Sampli
 
 std::string diagnostics_header() {
   std::string text =
-      "frame,tile,pixels,carried,fresh,refreshed,refreshedByRatio,restarted,resampled,"
+      std::string(kFirstColumns) +
+      "carried,fresh,refreshed,refreshedByRatio,restarted,resampled,"
       "localMovesProposed,localMovesAccepted,independentMovesProposed,independentMovesAccepted";
   for (std::size_t bin = 0; bin < SamplingStats::kEssBins; ++bin) {
     text += fmt::format(",essRatioFrom{:.3f}",
@@ -89,9 +93,19 @@ Result<std::vector<TileDiagnostics>> tiles_of(Journal& journal, const Digest& di
   return result;
 }
 
+/// Error (io): the file is there and is somebody's table.
+Status expect_replaceable(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(std::filesystem::symlink_status(path, error))) return {};
+  BATON_ASSIGN(const std::string before, read_text_file(path, kMaxDiagnosticsBytes));
+  if (before.starts_with(kFirstColumns)) return {};
+  return Error{ErrorKind::io, path.string() + ": is not by Baton and is kept"};
+}
+
 }  // namespace
 
-Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job) {
+Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job,
+                         const Roots& roots) {
   // Run by run: the rows of all tiles of a long job need not be in memory at once, their text may.
   std::string text;
   const Timeline timeline(job);
@@ -110,7 +124,8 @@ Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& 
   if (text.empty()) return {};
   text.insert(0, diagnostics_header());
   const auto path = std::filesystem::path(job.output.directory) / "diagnostics.csv";
-  return write_file_atomic(path, std::as_bytes(std::span(text)));
+  BATON_TRY(expect_replaceable(path));
+  return write_file_atomic(path, std::as_bytes(std::span(text)), roots);
 }
 
 }  // namespace baton

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/files.h"
 #include "coordinator/journal/journal.h"
 
 namespace baton {
@@ -27,6 +28,7 @@ std::string diagnostics_lines(std::vector<TileDiagnostics> tiles,
 
 /// Writes diagnostics.csv beside the job's frames from what the journal has recorded, whole or not
 /// at all. A job that has rendered nothing gets no file.
-Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job);
+Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job,
+                         const Roots& roots);
 
 }  // namespace baton

@@ -24,6 +24,8 @@ using Clock = std::chrono::steady_clock;
 /// After which a worker that got less than it requested may ask again.
 constexpr std::int32_t kRetryMs = 250;
 constexpr int kMaxFailuresShown = 100;
+/// Of what a refusal says; names in it may be of any length.
+constexpr std::size_t kMaxRefusalBytes = 64u << 10;
 
 }  // namespace
 
@@ -80,7 +82,8 @@ void FarmCore::reply_at(std::size_t place, const PeerId& peer, Message message) 
 }
 
 Status FarmCore::refuse(const PeerId& peer, const Error& error) {
-  return reply(peer, Refused{static_cast<std::uint8_t>(error.kind), error.message});
+  return reply(peer, Refused{static_cast<std::uint8_t>(error.kind),
+                             error.message.substr(0, kMaxRefusalBytes)});
 }
 
 // ---- jobs ---------------------------------------------------------------------------------------
@@ -198,7 +201,7 @@ Status FarmCore::perform(const RecordJobStatus& action) {
   // Before the status is durable: whoever is killed in between ends the job, and writes, again.
   const Scheduler::Job* job = scheduler.find_job(action.job);
   if (job != nullptr && !is_open(action.status) && check_output_root(job->spec, options.roots)) {
-    const Status written = write_diagnostics(journal, action.job, job->spec);
+    const Status written = write_diagnostics(journal, action.job, job->spec, options.roots);
     if (!written) spdlog::warn("no diagnostics: {}", written.error().message);
   }
   remove_job_file(action.job, action.status);
@@ -351,7 +354,7 @@ Result<std::string> FarmCore::mark_output(const Digest& job) {
   if (marked_.contains(job) && (lost_mark(job, open->spec) || (there && *there == frames)))
     return token;
   if (!check_output_root(open->spec, options.roots)) return std::string();
-  if (!write_token(file, token, frames)) return std::string();
+  if (!write_token(file, token, frames, options.roots)) return std::string();
   marked_.insert(job);
   BATON_TRY(journal.record_output_mark(job, resolve_folder(open->spec.output.directory)));
   return token;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,8 +13,16 @@ namespace baton {
 
 /// A job document as the coordinator works with it: its output folder goes by the name that the
 /// document has for it, "frames/" without its end, and leads to where that leads today, as for the
-/// workers. Digests are those of the document. Errors: parse_job_document's.
+/// workers. Digests are those of the document. Those that were parsed lately are at hand, since one
+/// of megabytes takes seconds. Called by any thread. Errors: parse_job_document's.
 Result<ParsedJobDocument> parse_farm_document(std::string_view text);
+
+/// A document, or why it is none. It stays at hand for as long as somebody has it.
+using SharedDocument = std::shared_ptr<const Result<ParsedJobDocument>>;
+/// What parse_farm_document() would say, as far as it is at hand; else nullptr.
+SharedDocument document_at_hand(const Digest& digest);
+/// One that somebody submits. Errors: parse_written_document's; those of the journal have none.
+SharedDocument share_document(std::string_view text);
 
 /// What a folder is, whichever name it goes by: its path without links, as far as it is there.
 std::string resolve_folder(const std::string& folder);
@@ -22,5 +31,13 @@ std::string resolve_folder(const std::string& folder);
 /// it, leads to the same place today: it may have been moved, and a link have come in its place.
 Result<std::vector<Digest>> jobs_in_folder(Journal& journal, const std::string& folder,
                                            const std::optional<std::string>& name = {});
+/// What a message needs of documents.
+struct NeededDocuments {
+  std::vector<SharedDocument> at_hand;
+  std::vector<std::string> texts;  ///< the others
+};
+/// Those of a folder's jobs. Error (bad_input): they have more than kMaxDocumentBytes.
+Result<NeededDocuments> documents_in_folder(Journal& journal, const std::string& folder);
+inline constexpr std::size_t kMaxDocumentBytes = 256u << 20;
 
 }  // namespace baton

@@ -19,13 +19,15 @@ FileReader::~FileReader() {
   thread_.join();
 }
 
-bool FileReader::request(const ReadFor& reason, std::vector<FileToRead> files) {
+bool FileReader::request(const ReadFor& reason, std::vector<FileToRead> files,
+                         std::vector<std::string> documents) {
   {
     const std::lock_guard lock(mutex_);
     if (num_open_ >= kMaxRequests) return false;
     ++num_open_;
     requests_.push_back(
         {{std::make_move_iterator(files.begin()), std::make_move_iterator(files.end())},
+         {std::make_move_iterator(documents.begin()), std::make_move_iterator(documents.end())},
          {reason, {}}});
   }
   changed_.notify_one();
@@ -51,10 +53,13 @@ void FileReader::run() {
     if (!request.files.empty()) {
       request.read.contents.push_back(read(request.files.front()));
       request.files.pop_front();
+    } else if (!request.documents.empty()) {
+      request.read.documents.push_back(share_document(request.documents.front()));
+      request.documents.pop_front();
     }
     lock.lock();
 
-    if (!request.files.empty()) {
+    if (!request.files.empty() || !request.documents.empty()) {
       requests_.push_back(std::move(request));
     } else {
       done_.push_back(std::move(request.read));

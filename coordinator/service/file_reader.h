@@ -13,6 +13,7 @@
 
 #include "common/base/result.h"
 #include "common/job/task.h"
+#include "coordinator/service/farm_document.h"
 #include "coordinator/service/file_table.h"
 
 namespace baton {
@@ -22,9 +23,14 @@ struct InspectionOf {
   Digest job;
   auto operator<=>(const InspectionOf&) const = default;
 };
+/// A message that needs documents which nobody has parsed lately; by the first of them.
+struct DocumentsOf {
+  Digest first;
+  auto operator<=>(const DocumentsOf&) const = default;
+};
 /// What files are read for: a job that is submitted or resumed, a report of a failed attempt, the
-/// end of a job.
-using ReadFor = std::variant<Digest, LeaseId, InspectionOf>;
+/// end of a job, documents.
+using ReadFor = std::variant<Digest, LeaseId, InspectionOf, DocumentsOf>;
 
 struct FileToRead {
   std::filesystem::path path;
@@ -44,6 +50,7 @@ struct FileToRead {
 struct FilesRead {
   ReadFor reason;
   std::vector<FileContent> contents;
+  std::vector<SharedDocument> documents = {};  ///< likewise
 };
 
 /// How files are read; a test may have a slow or a broken disk.
@@ -56,7 +63,8 @@ struct Disk {
       [](const auto&, const auto&) { return std::nullopt; };
 };
 
-/// Reads whole files on a thread of its own, since a slow disk may need minutes for them: one file
+/// Reads whole files, and parses documents, on a thread of its own, since a slow disk may need
+/// minutes for them: one
 /// of each request in turn, so that a short request does not wait for a long one. The thread ends
 /// with the object, when the file in hand is read; what is left of the requests is forgotten.
 class FileReader {
@@ -69,14 +77,16 @@ class FileReader {
   FileReader(const FileReader&) = delete;
   FileReader& operator=(const FileReader&) = delete;
 
-  /// False, and nothing follows: there are kMaxRequests already.
-  bool request(const ReadFor& reason, std::vector<FileToRead> files);
+  /// Also parses the documents. False, and nothing follows: there are kMaxRequests already.
+  bool request(const ReadFor& reason, std::vector<FileToRead> files,
+               std::vector<std::string> documents = {});
   /// The requests that are done, each once.
   std::vector<FilesRead> take();
 
  private:
   struct Request {
     std::deque<FileToRead> files;
+    std::deque<std::string> documents;
     FilesRead read;
   };
   void run();

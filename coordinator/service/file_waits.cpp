@@ -1,6 +1,9 @@
 #include "coordinator/service/file_waits.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace baton {
@@ -22,11 +25,41 @@ bool FileWaits::start(const ReadFor& reason, const std::string& text, std::vecto
   return true;
 }
 
+FileWaits::Parsing FileWaits::parse(const Incoming& message, NeededDocuments documents,
+                                    TimePoint now) {
+  std::erase_if(documents.texts, [&](const std::string& text) {
+    SharedDocument known = document_at_hand(digest_of(text));
+    const bool is_known = known != nullptr;
+    if (is_known) documents.at_hand.push_back(std::move(known));
+    return is_known;
+  });
+  std::size_t bytes = 0;
+  for (const std::string& text : documents.texts) bytes += text.size();
+  if (bytes <= kParsedAtOnceBytes) return Parsing::done;
+  const DocumentsOf reason{digest_of(documents.texts.front())};
+  if (join(reason, message, now)) return Parsing::waits;
+  const bool is_busy = std::ranges::any_of(waits_, [&](const auto& wait) {
+    return std::holds_alternative<DocumentsOf>(wait.first) &&
+           wait.second.speaker == message.speaker.name;
+  });
+  if (is_busy || !parser_.request(reason, {}, std::move(documents.texts))) return Parsing::no_place;
+  waits_.insert_or_assign(reason, Wait{fmt::format("reading documents of {} KiB", bytes >> 10),
+                                       {{message, now}},
+                                       message.speaker.name,
+                                       std::move(documents.at_hand)});
+  return Parsing::waits;
+}
+
 std::vector<Incoming> FileWaits::take_ready(FileTable& table) {
   std::vector<Incoming> ready;
-  for (FilesRead& read : reader_.take()) {
+  parsed_.clear();
+  std::vector<FilesRead> done = reader_.take();
+  std::ranges::move(parser_.take(), std::back_inserter(done));
+  for (FilesRead& read : done) {
+    std::ranges::move(read.documents, std::back_inserter(parsed_));
     for (const FileContent& content : read.contents) table.add(content);
-    if (const auto wait = waits_.extract(read.reason)) {
+    if (auto wait = waits_.extract(read.reason)) {
+      std::ranges::move(wait.mapped().at_hand, std::back_inserter(parsed_));
       for (Waiting& waiting : wait.mapped().messages) ready.push_back(std::move(waiting.message));
     } else {
       inspected_.push_back(std::move(read));

@@ -20,7 +20,11 @@ class FileWaits {
   static constexpr std::chrono::milliseconds kAnswerWithin{1000};
   static constexpr std::size_t kMaxWaiting = 64;  ///< messages for one reason
 
-  FileWaits(Disk disk, std::function<void()> wake) : reader_(std::move(disk), std::move(wake)) {}
+  /// Of documents that are parsed at once.
+  static constexpr std::size_t kParsedAtOnceBytes = 64u << 10;
+
+  FileWaits(Disk disk, const std::function<void()>& wake)
+      : reader_(std::move(disk), wake), parser_({}, wake) {}
 
   /// Files are being read for this reason: the message waits for them. False: they are not.
   bool join(const ReadFor& reason, const Incoming& message, TimePoint now);
@@ -28,6 +32,10 @@ class FileWaits {
   /// not, since too many wait.
   bool start(const ReadFor& reason, const std::string& text, std::vector<FileToRead> files,
              const Incoming& message, TimePoint now);
+  /// Documents that were not parsed lately are parsed before the message is handled: those of more
+  /// than kParsedAtOnceBytes on a thread, for one message of a speaker at a time.
+  enum class Parsing { done, waits, no_place };
+  Parsing parse(const Incoming& message, NeededDocuments documents, TimePoint now);
   /// Nobody waits for these files but the coordinator. False: there is no place for them now.
   bool inspect(const InspectionOf& reason, std::vector<FileToRead> files) {
     return reader_.request(reason, std::move(files));
@@ -52,10 +60,15 @@ class FileWaits {
   struct Wait {
     std::string text;
     std::vector<Waiting> messages;
+    // Of documents.
+    std::string speaker = {};
+    std::vector<SharedDocument> at_hand = {};
   };
   std::map<ReadFor, Wait> waits_;
   std::vector<FilesRead> inspected_;
-  FileReader reader_;
+  std::vector<SharedDocument> parsed_;  ///< for the messages that are handled now
+  /// Documents do not hold up frames.
+  FileReader reader_, parser_;
 };
 
 }  // namespace baton

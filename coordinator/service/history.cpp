@@ -141,7 +141,10 @@ Status History::lease_ended(const Scheduler::Job* job, const TellLeaseEnd& end) 
                   .reason = end.reason,
                   .seconds = seconds_since(end.granted_at)};
   event.has_task = job != nullptr;
-  if (job != nullptr) event.task = place_of(*job, end.lease.task, end.lease.attempt);
+  if (job != nullptr) {
+    event.task = place_of(*job, end.lease.task, end.lease.attempt);
+    etas_.add(*job, end, std::chrono::steady_clock::now());
+  }
   return tell(std::move(event));
 }
 

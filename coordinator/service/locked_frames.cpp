@@ -127,7 +127,7 @@ Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Diges
   if (!check_output_root(spec, roots)) return {};
   BATON_ASSIGN(std::set<std::string> files, files_of_versions(journal, versions, locks.frames));
   files.merge(frame_files(spec, {locks.frames.begin(), locks.frames.end()}));
-  BATON_TRY(record_locks(spec.output.directory, id.hex(), {files, locks.changed_ms}));
+  BATON_TRY(record_locks(spec.output.directory, id.hex(), {files, locks.changed_ms}, roots));
   // The folder's name may lead elsewhere tomorrow.
   const std::string today = resolve_folder(spec.output.directory);
   if (!files.empty() && !versions.empty())
@@ -135,7 +135,7 @@ Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Diges
   for (const Digest& version : versions) {
     BATON_ASSIGN(const std::vector<std::string> folders, journal.marked_folders(version));
     for (const std::string& folder : folders) {
-      if (folder != today) BATON_TRY(retain_locks(folder, id.hex(), files));
+      if (folder != today) BATON_TRY(retain_locks(folder, id.hex(), files, roots));
     }
   }
   return {};
@@ -177,7 +177,7 @@ Result<std::map<JobId, std::vector<FrameNumber>>> settle_locks(Journal& journal,
     } else {
       BATON_ASSIGN(const std::set<std::string> files,
                    files_of_versions(journal, versions, known.frames));
-      if (const Status dropped = retain_locks(spec.output.directory, job, files); !dropped)
+      if (const Status dropped = retain_locks(spec.output.directory, job, files, roots); !dropped)
         spdlog::warn("locks stay for other coordinators: {}", dropped.error().message);
     }
   }

@@ -45,7 +45,7 @@ template <> inline constexpr Rights kRights<SetPriority>        {"set priorities
 template <> inline constexpr Rights kRights<AskWhy>             {"ask why",       May::no,  May::yes, May::yes, May::yes};
 template <> inline constexpr Rights kRights<ListTasks>          {"list tasks",    May::no,  May::yes, May::yes, May::yes};
 template <> inline constexpr Rights kRights<DeleteJob>          {"delete jobs",   May::no,  May::no,  May::own, May::yes};
-template <> inline constexpr Rights kRights<DrainWorker>        {"drain workers", May::no,  May::no,  May::no,  May::yes};
+template <> inline constexpr Rights kRights<OrderWorker>        {"drain or hold workers", May::no,  May::no,  May::no,  May::yes};
 template <> inline constexpr Rights kRights<StopCoordinator>    {"stop the farm", May::no,  May::no,  May::no,  May::yes};
 // clang-format on
 
@@ -75,6 +75,16 @@ inline Status check_priority(const Speaker& speaker, std::int32_t priority, std:
                fmt::format("priority: user '{}' may give at most {} (--user-priority of the "
                            "coordinator), got {}",
                            speaker.name, most, priority)};
+}
+
+/// Error (usage): a user's key that may not replace files that no job known here has written.
+inline Status check_replace_unknown(const Speaker& speaker) {
+  if (speaker.name.empty() || speaker.role != Role::user) return {};
+  return Error{
+      ErrorKind::usage,
+      fmt::format("no job that is known here has written it: user '{}' may not replace it, "
+                  "an admin may; or move it away",
+                  speaker.name)};
 }
 
 }  // namespace baton

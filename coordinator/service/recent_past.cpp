@@ -7,9 +7,10 @@ namespace baton {
 std::uint64_t RecentPast::kinds() {
   std::uint64_t kinds = 0;
   using enum FarmEventKind;
-  for (const FarmEventKind kind : {coordinator_started, job_submitted, job_changed, job_resumed,
-                                   job_paused, job_done, job_failed, job_cancelled, job_deleted,
-                                   worker_joined, worker_left, worker_lost, worker_drained})
+  for (const FarmEventKind kind :
+       {coordinator_started, job_submitted, job_changed, job_resumed, job_paused, job_done,
+        job_failed, job_cancelled, job_deleted, worker_joined, worker_left, worker_lost,
+        worker_drained, worker_held, worker_released})
     kinds |= bit_of(kind);
   return kinds;
 }
@@ -49,7 +50,16 @@ void RecentPast::add(const FarmEvent& event) {
       if (const auto here = connected_.find(event.worker); here != connected_.end())
         here->second.is_draining = true;
       break;
+    case FarmEventKind::worker_held:
+      held_.insert(event.worker);
+      break;
+    case FarmEventKind::worker_released:
+      held_.erase(event.worker);
+      break;
     case FarmEventKind::worker_left:
+      held_.erase(event.worker);
+      end_worker(event);
+      break;
     case FarmEventKind::worker_lost:
       end_worker(event);
       break;

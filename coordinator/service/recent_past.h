@@ -33,6 +33,9 @@ class RecentPast {
   std::vector<AbsentWorker> lost(std::int64_t since_ms) const;
   /// What became of a worker that was lost or has left; nullptr: it is here, or not known.
   const AbsentWorker* absent(const std::string& worker) const;
+  /// Whether a worker is to take nothing new; that stays so where it comes again, but for one that
+  /// has ended in order.
+  bool is_held(const std::string& worker) const { return held_.contains(worker); }
   /// Since when nobody is connected, as far as it is known; 0: it is not, or somebody is.
   std::int64_t alone_since_ms() const { return connected_.empty() ? alone_since_ms_ : 0; }
 
@@ -48,6 +51,7 @@ class RecentPast {
     bool is_draining = false;
   };
   std::map<std::string, Arrival> connected_;
+  std::set<std::string> held_;
   std::map<std::string, AbsentWorker> absent_;
   std::int64_t alone_since_ms_ = 0;
 };

@@ -26,6 +26,7 @@ constexpr std::chrono::milliseconds kTick{250};
 /// What comes again is told so often.
 constexpr std::chrono::minutes kTellInterval{1};
 constexpr std::size_t kMaxTold = 100;
+constexpr std::size_t kMaxWorkerName = 256;
 
 /// bad_input: no worker can have so many in hand.
 Status check_leases(const std::vector<LeaseId>& running) {
@@ -51,6 +52,18 @@ Status wait_for_disk(FarmCore& farm, const std::string& worker, const LeaseId& l
   if (!pauses) spdlog::warn("job {} waits for {}", farm.history.name_of(lease.job), waits);
   BATON_TRY(farm.step(SpaceLacking{worker, lease, waits}));
   return pauses ? farm.step(JobPaused{lease.job, waits}) : Status();
+}
+
+/// What a worker has to say of a job's files, for those who ask for the job.
+void keep_notes(FarmCore& farm, const TaskDone& report) {
+  constexpr std::size_t kMostNotes = 100;
+  if (report.notes.empty() || farm.scheduler.find_job(report.lease.job) == nullptr) return;
+  std::vector<std::string>& notes = farm.notes[report.lease.job];
+  for (const std::string& note : report.notes) {
+    std::string text = note.substr(0, limits::kMaxTextLength);
+    if (notes.size() < kMostNotes && std::ranges::find(notes, text) == notes.end())
+      notes.push_back(std::move(text));
+  }
 }
 
 }  // namespace
@@ -159,10 +172,14 @@ Status Service::end_turn() {
 // ---- messages of workers ------------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const WorkerHello& message) {
-  if (message.worker_id.empty() || message.worker_id.size() > limits::kMaxTextLength) {
+  if (message.worker_id.empty() || message.worker_id.size() > kMaxWorkerName) {
     return farm_.refuse(peer,
-                        {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
+                        {ErrorKind::bad_input,
+                         fmt::format("a worker needs a name of at most {} bytes", kMaxWorkerName)});
   }
+  const WorkerHello* const before = farm_.peers.hello_of(farm_.peers.worker_of(peer));
+  if (before != nullptr && before->instance != message.instance)
+    return farm_.refuse(peer, {ErrorKind::bad_input, "this connection is another worker's"});
   if (const Status few = check_leases(message.running); !few)
     return farm_.refuse(peer, few.error());
   // A worker is the instance that it drew; its name is for people, and others may have it, too.
@@ -241,7 +258,8 @@ std::optional<std::string> Service::other_build(const WorkerHello& hello) const 
 }
 
 Status Service::receive_from(const std::string& worker, const LeaseRequest& message) {
-  return farm_.step(WorkRequested{worker, message.count});
+  const bool is_held = farm_.history.past().is_held(worker);
+  return farm_.step(WorkRequested{worker, is_held ? 0 : message.count});
 }
 
 Status Service::receive_from(const std::string& worker, const Heartbeat& message) {
@@ -281,21 +299,9 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
                  farm_.store.path(*missing).string());
     return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
   }
-  keep_notes(message);
+  keep_notes(farm_, message);
   BATON_TRY(farm_.step(TaskCompleted{worker, message.lease, message.made}));
   return frame ? keep_frame_file(message, *frame) : Status();
-}
-
-/// What a worker has to say of a job's files, for those who ask for the job.
-void Service::keep_notes(const TaskDone& report) {
-  constexpr std::size_t kMostNotes = 100;
-  if (report.notes.empty() || farm_.scheduler.find_job(report.lease.job) == nullptr) return;
-  std::vector<std::string>& notes = farm_.notes[report.lease.job];
-  for (const std::string& note : report.notes) {
-    std::string text = note.substr(0, limits::kMaxTextLength);
-    if (notes.size() < kMostNotes && std::ranges::find(notes, text) == notes.end())
-      notes.push_back(std::move(text));
-  }
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
@@ -385,6 +391,17 @@ bool Service::await_inputs(const std::string& worker, const TaskFailed& message)
   return true;
 }
 
+/// Whether a message waits for documents that must be parsed; one for which there is no place is
+/// refused for now.
+Result<bool> Service::await_documents(const PeerId& peer, const Message& message,
+                                      NeededDocuments documents) {
+  const auto parsing = waits_->parse({peer, message, speaker_}, std::move(documents),
+                                     std::chrono::steady_clock::now());
+  if (parsing == FileWaits::Parsing::no_place)
+    BATON_TRY(farm_.refuse(peer, {ErrorKind::timeout, "other documents are being read"}));
+  return parsing != FileWaits::Parsing::done;
+}
+
 /// Whether a report waits for its files; not for longer than file_patience.
 bool Service::await_outputs(const TaskDone& message) {
   constexpr std::size_t kMostLate = limits::kMaxWorkers;
@@ -412,7 +429,7 @@ Status Service::handle(const Incoming& incoming) {
   }
   const std::string worker = farm_.peers.worker_of(peer);
   speaker_ = incoming.speaker;
-  farm_.history.set_actor(worker.empty() ? speaker_.name : worker);
+  farm_.history.set_actor(worker.empty() ? speaker_.name : "worker " + worker);
   return std::visit(
       [&](const auto& message) -> Status {
         using M = std::decay_t<decltype(message)>;

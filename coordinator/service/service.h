@@ -80,7 +80,7 @@ class Service {
   Status receive(const PeerId& peer, const LockFrames& message);
   Status receive(const PeerId& peer, const SetPriority& message);
   Status receive(const PeerId& peer, const DeleteJob& message);
-  Status receive(const PeerId& peer, const DrainWorker& message);
+  Status receive(const PeerId& peer, const OrderWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
   template <class E>
   Status change_job(const PeerId& peer, const std::string& prefix);
@@ -98,6 +98,8 @@ class Service {
   Status handle_read();
   bool await_inputs(const std::string& worker, const TaskFailed& message);
   bool await_outputs(const TaskDone& message);
+  Result<bool> await_documents(const PeerId& peer, const Message& message,
+                               NeededDocuments documents);
   Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
                                                 const JobVersion& version, const JobSpec& spec,
                                                 const LockedFrames& locked);
@@ -109,8 +111,6 @@ class Service {
   void pass(const Digest& job) { unreadable_.erase(job); }
   Status judge_place(const std::string& worker, const LeaseReturn& message);
   Result<bool> watch_folder(const Digest& job);
-
-  void keep_notes(const TaskDone& report);
 
   std::unique_ptr<FarmCore> owned_farm_;
   FarmCore& farm_;

@@ -189,9 +189,10 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   // Jobs that ended in this turn of the loop are read from the archive, too.
   BATON_TRY(farm_.archive_ended());
   // A job that cannot be run is refused before it leaves a trace.
-  if (const Status written = expect_written_document(message.json); !written)
-    return farm_.refuse(peer, written.error());
-  Result<ParsedJobDocument> document = parse_farm_document(message.json);
+  BATON_ASSIGN(const bool is_unread, await_documents(peer, message, {{}, {message.json}}));
+  if (is_unread) return {};
+  const SharedDocument submitted = share_document(message.json);
+  Result<ParsedJobDocument> document = *submitted;
   if (!document) return farm_.refuse(peer, document.error());
   if (const Status within = check_roots(*document, farm_.options.roots); !within) {
     spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
@@ -201,6 +202,13 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
           check_priority(speaker_, document->job.priority, farm_.options.user_priority);
       !may)
     return farm_.refuse(peer, may.error());
+  Result<NeededDocuments> others =
+      documents_in_folder(farm_.journal, document->job.output.directory);
+  if (!others && others.error().kind != ErrorKind::bad_input) return others.error();
+  if (!others) return farm_.refuse(peer, others.error());
+  others->at_hand.push_back(submitted);
+  BATON_ASSIGN(const bool has_unread, await_documents(peer, message, std::move(*others)));
+  if (has_unread) return {};
   Submission submission(farm_, files_, speaker_);
   SubmitJob wanted = message;
   BATON_ASSIGN(wanted.json,
@@ -228,7 +236,9 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
                await_frames(peer, message, {document->digest, id}, document->job, locked));
   if (!odd) return {};
   for (const FramesInDoubt::Frame& frame : odd->doubt.strange) {
-    const Status own = frame.writer ? farm_.check_own(speaker_, *frame.writer) : Status();
+    const Status own = frame.writer      ? farm_.check_own(speaker_, *frame.writer)
+                       : message.restart ? check_replace_unknown(speaker_)
+                                         : Status();
     if (!own)
       return farm_.refuse(
           peer, {own.error().kind, fmt::format("{}: {}", frame.file, own.error().message)});
@@ -451,16 +461,33 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   return receive(peer, ListJobs{});
 }
 
-Status Service::receive(const PeerId& peer, const DrainWorker& message) {
-  if (!farm_.peers.peer_of(message.worker_id)) {
-    return farm_.refuse(peer,
-                        {ErrorKind::bad_input,
-                         fmt::format("worker '{}': no worker has this name", message.worker_id)});
+Status Service::receive(const PeerId& peer, const OrderWorker& message) {
+  const std::string& worker = message.worker_id;
+  if (!farm_.peers.peer_of(worker)) {
+    return farm_.refuse(
+        peer, {ErrorKind::bad_input, fmt::format("worker '{}': no worker has this name", worker)});
   }
-  spdlog::info("worker {} is told to finish", message.worker_id);
-  farm_.peers.drain(message.worker_id);
-  BATON_TRY(farm_.history.happened(FarmEventKind::worker_drained, message.worker_id));
-  BATON_TRY(farm_.reply_to(message.worker_id, Drain{}));
+  const bool is_held = farm_.history.past().is_held(worker);
+  switch (message.order) {
+    case WorkerOrder::drain:
+      spdlog::info("worker {} is told to finish", worker);
+      farm_.peers.drain(worker);
+      BATON_TRY(farm_.history.happened(FarmEventKind::worker_drained, worker));
+      BATON_TRY(farm_.reply_to(worker, Drain{}));
+      break;
+    case WorkerOrder::hold:
+      if (is_held) break;
+      spdlog::info("worker {} is held", worker);
+      BATON_TRY(farm_.history.happened(FarmEventKind::worker_held, worker));
+      BATON_TRY(farm_.step(WorkRequested{worker, 0}));
+      break;
+    case WorkerOrder::release:
+      if (!is_held) break;
+      // It asks again by itself.
+      spdlog::info("worker {} is released", worker);
+      BATON_TRY(farm_.history.happened(FarmEventKind::worker_released, worker));
+      break;
+  }
   return receive(peer, ListJobs{});
 }
 

@@ -106,8 +106,8 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
                       document.job.name, farm_.history.name_of(digest), former.document.job.name,
                       job_status_name(other.status), document.job.output.directory)};
     }
-    const Status own = farm_.check_own(speaker_, digest);
-    if (!own && (other.has_place || other.busy))
+    // A folder with a job has an owner: diagnostics and the marks are one for all in it.
+    if (const Status own = farm_.check_own(speaker_, digest); !own)
       return Error{ErrorKind::usage, own.error().message + "; another output.directory keeps it"};
     if (!other.locked.empty())
       return locked_elsewhere(document.job, other.locked, farm_.history.name_of(digest),

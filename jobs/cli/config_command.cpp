@@ -5,6 +5,7 @@
 #include "common/base/settings.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 
 namespace baton {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 /// since.
 void print_settings(const std::vector<Setting>& settings, bool json) {
   if (!json) {
-    fmt::print("{}", settings_text(settings, "baton"));
+    say("{}", settings_text(settings, "baton"));
     return;
   }
   nlohmann::ordered_json list = nlohmann::ordered_json::array();

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "jobs/cli/commands.h"
+#include "jobs/cli/say.h"
 
 namespace baton {
 
@@ -24,7 +25,7 @@ void add_coordinator_options(CLI::App& command, CoordinatorLink& link) {
 }
 
 void print_pending(const RequestClient& client, std::set<std::string>& printed) {
-  if (printed.insert(client.pending()).second) fmt::print(stderr, "{}\n", client.pending());
+  if (printed.insert(client.pending()).second) tell("{}\n", client.pending());
 }
 
 ExitCode finish_with_coordinator(const Result<ExitCode>& outcome) {

@@ -96,12 +96,20 @@ ExitCode exit_code_of(const JobDetail& detail) {
   return has_strange_frames ? ExitCode::io : exit_code_of(status);
 }
 
+std::string eta_text(const Eta& eta) {
+  if (!eta.is_known()) return "ETA not known yet";
+  return fmt::format("ETA {} ({} to {})", duration_text(eta.likely_s), duration_text(eta.early_s),
+                     duration_text(eta.late_s));
+}
+
 std::string job_line(const ListedJob& listed) {
   const JobSummary& job = listed.summary;
-  return fmt::format("{}  {:<9}  {:>11} frames  {:>15} tasks  {}{}", listed.identity.id.short_hex(),
-                     job_activity_name(listed.now.activity),
+  const bool has_eta = listed.now.activity == JobActivity::rendering || listed.now.eta.is_known();
+  return fmt::format("{}  {:<9}  {:>11} frames  {:>15} tasks  {}{}{}",
+                     listed.identity.id.short_hex(), job_activity_name(listed.now.activity),
                      fmt::format("{}/{}", job.frames_done, job.frames_total),
                      fmt::format("{}/{}", job.tasks_done, job.tasks_total), job.name,
+                     has_eta ? "  " + eta_text(listed.now.eta) : "",
                      listed.now.reason.empty() ? "" : "  [" + listed.now.reason + "]");
 }
 
@@ -223,6 +231,16 @@ std::vector<std::string> fresh_growth(const ShownJob& job, std::size_t& num_told
   return {job.growth.begin() + static_cast<std::ptrdiff_t>(first), job.growth.end()};
 }
 
+namespace {
+
+/// Seconds from now; null: not known.
+ordered_json eta_json(const Eta& eta) {
+  if (!eta.is_known()) return nullptr;
+  return {{"early", eta.early_s}, {"likely", eta.likely_s}, {"late", eta.late_s}};
+}
+
+}  // namespace
+
 ordered_json summary_json(const ListedJob& listed) {
   const JobSummary& job = listed.summary;
   const JobIdentity& who = listed.identity;
@@ -238,6 +256,7 @@ ordered_json summary_json(const ListedJob& listed) {
                          {"status", job_status_name(job.status)},
                          {"activity", job_activity_name(listed.now.activity)},
                          {"reason", listed.now.reason},
+                         {"eta", eta_json(listed.now.eta)},
                          {"priority", job.priority},
                          {"outputDirectory", job.output_directory},
                          {"framesTotal", job.frames_total},

@@ -17,7 +17,11 @@ ExitCode exit_code_of_stopped(JobStatus status);
 /// How a command about a job ends; io where it has failed since frames are not what it has written.
 ExitCode exit_code_of(const JobDetail& detail);
 
-/// The job's line in a list: what it does, how far it is, and for what it waits.
+/// "ETA 12m05s (9m10s to 16m40s)", the time left and the interval that holds four times in five;
+/// "ETA not known yet" where too few tasks are done.
+std::string eta_text(const Eta& eta);
+/// The job's line in a list: what it does, how far it is, when it will be done, and for what it
+/// waits.
 std::string job_line(const ListedJob& job);
 /// The job's line in a list with owner, priority and times.
 std::string long_job_line(const ListedJob& job);

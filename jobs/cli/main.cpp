@@ -7,18 +7,18 @@
 
 #include "common/base/build.h"
 #include "common/base/command_pages.h"
-#include "common/base/legible.h"
 #include "common/base/log.h"
 #include "common/base/option_values.h"
 #include "common/base/settings.h"
 #include "common/base/suggest.h"
 #include "jobs/cli/commands.h"
+#include "jobs/cli/say.h"
 
 namespace baton {
 
 ExitCode finish(const Result<ExitCode>& outcome) {
   if (outcome) return *outcome;
-  fmt::print(stderr, "{}\n", legible_text(outcome.error().message));
+  tell("{}\n", outcome.error().message);
   return exit_code_of(outcome.error().kind);
 }
 
@@ -128,7 +128,7 @@ int main(int argc, char** argv) {
   baton::init_logging("baton");
   for (const auto& look : {unknown_command, unknown_option}) {
     if (const std::string fault = look(app, argc, argv); !fault.empty()) {
-      fmt::print(stderr, "{}\n", fault);
+      baton::tell("{}\n", fault);
       return static_cast<int>(baton::ExitCode::usage);
     }
   }

@@ -4,6 +4,7 @@
 
 #include "jobs/auto/unit_costs.h"
 #include "jobs/cli/farm_job_runner.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -12,16 +13,15 @@ namespace {
 Status settle(JobSpec& job, const StudyFolder& folder, FarmJobRunner& runner) {
   BATON_ASSIGN(const double ray_factor, ray_cost_factor(job));
   const PilotPlan plan = plan_pilot(job, ray_factor);
-  fmt::print(stderr, "a pilot chooses the method: {}\n", pilot_text(plan));
+  tell("a pilot chooses the method: {}\n", pilot_text(plan));
   runner.count_as_one("trying", plan.frames);
   BATON_ASSIGN(const std::vector<PilotNumbers> pilot, settle_auto(job, folder, runner));
   runner.finish_count();
   for (const PilotNumbers& seen : pilot) {
-    fmt::print(stderr, "pilot      {:<26} error {:.4f}  {:.2f} us per pixel and frame\n",
-               seen.candidate.name(), seen.error, seen.cost_us);
+    tell("pilot      {:<26} error {:.4f}  {:.2f} us per pixel and frame\n", seen.candidate.name(),
+         seen.error, seen.cost_us);
   }
-  fmt::print(stderr, "chosen     {}\nbecause    {}\n", job.metadata["auto.choice"],
-             job.metadata["auto.reason"]);
+  tell("chosen     {}\nbecause    {}\n", job.metadata["auto.choice"], job.metadata["auto.reason"]);
   return {};
 }
 

@@ -210,7 +210,7 @@ Status write_conversations(const fs::path& folder) {
                        {kOwner, ResumeJob{id}},
                        {kOwner, SetPriority{id, 60}},
                        {kOwner, LockFrames{id, {FrameNumber(2)}, false}},
-                       {kAdmin, DrainWorker{"one"}},
+                       {kAdmin, OrderWorker{"one"}},
                        {kAdmin, CancelJob{id}},
                        {kAdmin, DeleteJob{id}},
                        {kAdmin, StopCoordinator{}}}},

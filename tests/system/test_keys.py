@@ -74,7 +74,7 @@ def roles_decide_who_may_do_what(programs, folder):
         farm.speak("anna", "job", "wait", job)
 
         # A user's key stops nothing that is not its own; a worker's key asks for nothing.
-        farm.refused("user", "worker", "drain", "worker0", says="user 'user' may not drain workers")
+        farm.refused("user", "worker", "drain", "worker0", says="user 'user' may not drain or hold workers")
         farm.refused("anna", "job", "cancel", job, says="belongs to 'user': user 'anna' may not change it")
         farm.refused("anna", "job", "delete", job, says="user 'anna' may not change it")
         farm.refused("anna", "job", "submit", small(folder / "job", seed=8), "--restart",
@@ -92,7 +92,7 @@ def roles_decide_who_may_do_what(programs, folder):
         stranger = farm.start_worker("stranger", key="user")
         check_equal(stranger.wait(), USAGE, "exit code of a worker with a user's key")
         check("user 'user' may not work" in stranger.log(), stranger.log())
-        for line in ("refused: user 'user' may not drain workers", "user 'anna' may not change it",
+        for line in ("refused: user 'user' may not drain or hold workers", "user 'anna' may not change it",
                      "refused: worker 'worker' may not list jobs", "refused: user 'user' may not work"):
             check(line in farm.coordinator.log(), f"not logged: {line}\n{farm.coordinator.log()}")
 
@@ -113,6 +113,37 @@ def roles_decide_who_may_do_what(programs, folder):
             farm.speak(who, "job", "resume", job)
         farm.speak("admin", "farm", "stop", "--yes")
         check_equal(farm.coordinator.wait(), OK, "exit code of the stopped coordinator")
+
+
+def a_folder_is_its_owners(programs, folder):
+    """Whose job is known in a folder has it; without one, a user replaces nothing there that no job is known to have written."""
+    with KeyedFarm(programs, folder) as farm:
+        programs.run("baton", "key", "add", farm.keys, "anna")
+        farm.start_coordinator()
+        farm.start_worker()
+        job = json.loads(farm.speak("user", "job", "submit", small(folder / "job"), "--json").stdout)["id"]
+        farm.speak("user", "job", "wait", job)
+        farm.let_in("anna")
+        files = lambda: {file.name: file.read_bytes() for file in (folder / "job/frames").iterdir() if file.is_file()}
+        before = files()
+        check("diagnostics.csv" in before, str(list(before)))
+        beside = small(folder / "beside", output={"directory": str(folder / "job/frames"), "pattern": "mine.####.exr"})
+        farm.refused("anna", "job", "submit", beside, says="belongs to 'user': user 'anna' may not change it")
+        farm.speak("admin", "job", "delete", job)
+        for words in ([], ["--restart"]):
+            answer = farm.speak("anna", "job", "submit", small(folder / "job", seed=8), *words, expect=None)
+            says = "no job that is known here has written it: user 'anna' may not replace it" if words else "is kept"
+            check(answer.returncode != OK and says in answer.stderr, answer.stderr)
+        check(files() == before, "files of another user are others")
+
+        # An admin may; what is no table of Baton's stays in any case.
+        table = folder / "job/frames/diagnostics.csv"
+        table.write_text("shot,notes\n")
+        job = json.loads(farm.speak("admin", "job", "submit", small(folder / "job", seed=8), "--restart", "--json").stdout)["id"]
+        farm.speak("admin", "job", "wait", job)
+        check_equal(table.read_text(), "shot,notes\n", "somebody's table")
+        wait_until(lambda: "is not by Baton and is kept" in farm.coordinator.log(), "that is told")
+        check(files()["frame.0001.exr"] != before["frame.0001.exr"], "an admin's job has replaced the frame")
 
 
 def without_the_right_key_nobody_comes_in(programs, folder):

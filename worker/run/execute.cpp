@@ -288,8 +288,9 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
     BATON_TRY(expect_unlocked(loaded, frame, store.stop()));
     return !place->is_free;
   };
-  const Result<WrittenFrame> written = write_frame(
-      loaded.job, loaded.digest, frame, std::move(image), plate_image, may_replace, store.stop());
+  const Result<WrittenFrame> written =
+      write_frame(loaded.job, loaded.digest, frame, std::move(image), plate_image, may_replace,
+                  store.stop(), loaded.roots);
   if (!written && other) return TaskResult{.made = {}, .in_place = std::move(other)};
   if (!written && written.error().kind == ErrorKind::timeout) {
     TaskResult unseen;

@@ -198,7 +198,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
                                  FilmTile image, const std::optional<RgbImage>& plate,
                                  const std::function<Result<bool>(const Digest& made)>& may_replace,
-                                 const std::stop_token& stop) {
+                                 const std::stop_token& stop, const Roots& roots) {
   FrameQuality quality = judge_frame(image);
   if (job.output.clamp_negative) clamp_negative(image);
   if (plate) {
@@ -238,7 +238,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
   };
   Patience patience(stop);
   for (bool is_written = false; !is_written;) {
-    const Result<bool> written = write_file_verified(path, bytes, check);
+    const Result<bool> written = write_file_verified(path, bytes, check, roots);
     is_written = written && *written;
     if (is_written) continue;
     const Error error =

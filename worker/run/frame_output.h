@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/digest.h"
+#include "common/base/files.h"
 #include "common/base/result.h"
 #include "common/image/film_tile.h"
 #include "common/image/image_io.h"
@@ -43,12 +44,13 @@ struct WrittenFrame {
 /// in its place may go; a job may have made way for another while the frame was written, and its
 /// place be taken. A disk that is away for a moment is waited for, until `stop` is requested.
 /// Errors: the disk, a file that is not what was written, that of may_replace; timeout, something
-/// is in its place that is not seen here and might not go.
+/// is in its place that is not seen here and might not go; bad_input, its folder is in none of
+/// `roots` (write_file_atomic).
 Result<WrittenFrame> write_frame(
     const JobSpec& job, const Digest& job_digest, FrameIndex frame, FilmTile image,
     const std::optional<RgbImage>& plate = {},
     const std::function<Result<bool>(const Digest& made)>& may_replace = {},
-    const std::stop_token& stop = {});
+    const std::stop_token& stop = {}, const Roots& roots = {});
 
 /// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
 /// `block` (0-based, modulo the number of blocks) its values. ErrorKind::corrupt names channel and

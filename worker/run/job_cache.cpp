@@ -106,7 +106,8 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
                                                       .context = nullptr,
                                                       .token = document.token,
                                                       .id = document.id,
-                                                      .plates = machine.memory.pictures()});
+                                                      .plates = machine.memory.pictures(),
+                                                      .roots = machine.roots});
   loaded->job.output.directory = here.job.output.directory;
   BATON_TRY(check_roots(here, machine.roots));
   if (const Status seen = expect_output_folder(*loaded); !seen) {

@@ -41,6 +41,7 @@ struct LoadedJob {
   /// Files that the job reads, where this machine has them.
   std::vector<KnownAsset> assets = {};
   PixelLimit plates = {};  ///< MemoryBudget::pictures
+  Roots roots = {};        ///< Machine::roots
 };
 
 using LoadedJobPtr = std::shared_ptr<const LoadedJob>;

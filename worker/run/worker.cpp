@@ -103,8 +103,7 @@ constexpr std::chrono::seconds kLoadPatience{limits::kMaxSecondsToLoad};
 /// Executes a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
 Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token& stop,
-                                  std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch,
-                                  const Roots& roots) {
+                                  std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch) {
   // The time that a task may take does not include the loading of its job, which has its own.
   LoadedJobPtr loaded;
   {
@@ -121,7 +120,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
       std::chrono::steady_clock::now() + std::chrono::seconds(loaded->job.max_seconds_per_task));
   const TaskKey& key = task.grant.lease.task;
   // Again for each frame: links may have changed.
-  BATON_TRY(check_output_root(loaded->job, roots));
+  BATON_TRY(check_output_root(loaded->job, loaded->roots));
   if (key.kind == TaskKind::assemble) {
     // So may what is mounted.
     if (const Status seen = expect_output_folder(*loaded, stop); !seen) {
@@ -204,7 +203,7 @@ class Worker {
             options.num_threads,
             [this](const QueuedTask& task, const std::stop_token& stop,
                    std::vector<BlobRef>& left) {
-              return execute_queued(task, stop, left, notes_, watch_, machine_.roots);
+              return execute_queued(task, stop, left, notes_, watch_);
             },
             [this](std::span<const QueuedTask> tasks) { return publish_queued(tasks, watch_); },
             [this] { channel_.wake(); }) {}

@@ -201,9 +201,9 @@ Result<ParsedJobDocument> parse_job_document(std::string_view text) {
   return document;
 }
 
-Status expect_written_document(std::string_view text) {
+Result<ParsedJobDocument> parse_written_document(std::string_view text) {
   BATON_ASSIGN(ParsedJobDocument document, parse_job_document(text));
-  if (write(std::move(document), -1) == text) return {};
+  if (write(document, -1) == text) return document;
   return Error{
       ErrorKind::bad_input,
       "job document: expected it as `baton` writes one, without more blanks or other forms "

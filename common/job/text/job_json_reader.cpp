@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/base/files.h"
+#include "common/base/legible.h"
 #include "common/base/limits.h"
 #include "common/base/suggest.h"
 #include "common/job/text/job_json_text.h"
@@ -40,10 +41,7 @@ bool is_whole(const json& value) {
          (value.is_number() && std::floor(value.get<double>()) == value.get<double>());
 }
 
-bool has_control_character(const std::string& text) {
-  return std::any_of(text.begin(), text.end(),
-                     [](unsigned char c) { return c < 0x20 || c == 0x7F; });
-}
+bool has_control_character(const std::string& text) { return legible_line(text) != text; }
 
 }  // namespace
 

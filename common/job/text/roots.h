@@ -1,14 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <vector>
 
+#include "common/base/files.h"
 #include "common/job/text/job_json.h"
 
 namespace baton {
-
-/// The folders that jobs may read from and write to; empty: all.
-using Roots = std::vector<std::filesystem::path>;
 
 /// Whether a path, its links followed, lies in one of the roots; it need not exist yet. A link that
 /// leads nowhere lies in none.

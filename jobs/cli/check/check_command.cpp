@@ -22,6 +22,7 @@
 #include "jobs/cli/commands.h"
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
 
@@ -133,22 +134,21 @@ void print_maps(const std::vector<MapReport>& maps) {
     const MapReport& map = maps[first];
     const std::string until =
         last > first ? fmt::format(" to {}, {} maps", maps[last].path, last - first + 1) : "";
-    fmt::print("map        {}{} ({}x{})\n", map.path, until, map.file_width, map.file_height);
-    if (map.width < map.file_width)
-      fmt::print("           reduced to {}x{}\n", map.width, map.height);
-    if (!map.colors.empty()) fmt::print("           converted: {}\n", map.colors);
+    say("map        {}{} ({}x{})\n", map.path, until, map.file_width, map.file_height);
+    if (map.width < map.file_width) say("           reduced to {}x{}\n", map.width, map.height);
+    if (!map.colors.empty()) say("           converted: {}\n", map.colors);
   }
 }
 
 void print_assets(const AssetReport& assets) {
-  fmt::print("geometry   {} triangles in {} instances of {} meshes\n", assets.triangles,
-             assets.instances, assets.meshes);
+  say("geometry   {} triangles in {} instances of {} meshes\n", assets.triangles, assets.instances,
+      assets.meshes);
   if (assets.deforming_meshes > 0)
-    fmt::print("           {} of the meshes deform\n", assets.deforming_meshes);
+    say("           {} of the meshes deform\n", assets.deforming_meshes);
   print_maps(assets.maps);
   if (const auto& map = assets.camera_map) {
-    fmt::print("cameraMap  {} ({}x{})\n", map->path, map->file_width, map->file_height);
-    if (!map->colors.empty()) fmt::print("           converted: {}\n", map->colors);
+    say("cameraMap  {} ({}x{})\n", map->path, map->file_width, map->file_height);
+    if (!map->colors.empty()) say("           converted: {}\n", map->colors);
   }
 }
 
@@ -156,14 +156,14 @@ void print_assets(const AssetReport& assets) {
 void print_plates(const JobSpec& job, const std::vector<PlateReport>& plates) {
   if (plates.empty()) return;
   const auto file = [&](FrameNumber frame) { return file_at(*job.output.plate, frame); };
-  fmt::print("over       {}{}\n", file(job.frames.front()),
-             job.frames.size() > 1 ? " ... " + file(job.frames.back()) : "");
+  say("over       {}{}\n", file(job.frames.front()),
+      job.frames.size() > 1 ? " ... " + file(job.frames.back()) : "");
   std::map<std::string, std::size_t> conversions;
   for (const PlateReport& plate : plates) ++conversions[plate.colors];
   conversions.erase("");
   for (const auto& [text, count] : conversions)
-    fmt::print("           {}converted: {}\n",
-               count < plates.size() ? fmt::format("{} of {} ", count, plates.size()) : "", text);
+    say("           {}converted: {}\n",
+        count < plates.size() ? fmt::format("{} of {} ", count, plates.size()) : "", text);
 }
 
 void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& assets,
@@ -171,57 +171,52 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   const auto total = [&](std::int64_t bytes) {
     return bytes_text(static_cast<std::uint64_t>(bytes));
   };
-  fmt::print("job        {}\n", job.name);
-  fmt::print("frames     {} ({})\n", e.frames, format_frames(job.frames));
+  say("job        {}\n", job.name);
+  say("frames     {} ({})\n", e.frames, format_frames(job.frames));
   const PixelRect image = job.image.shown();
-  fmt::print("image      {}x{}, {} tiles\n", image.width(), image.height(), e.tiles);
+  say("image      {}x{}, {} tiles\n", image.width(), image.height(), e.tiles);
   if (job.image.region)
-    fmt::print("           from ({}, {}) of {}x{}\n", image.x0, image.y0, job.image.width,
-               job.image.height);
+    say("           from ({}, {}) of {}x{}\n", image.x0, image.y0, job.image.width,
+        job.image.height);
   if (const Overscan& o = job.image.overscan; o != Overscan{})
-    fmt::print("           overscan {} left, {} on top, {} right, {} below: {}x{} are rendered\n",
-               o.left, o.top, o.right, o.bottom, job.image.rendered().width(),
-               job.image.rendered().height());
+    say("           overscan {} left, {} on top, {} right, {} below: {}x{} are rendered\n", o.left,
+        o.top, o.right, o.bottom, job.image.rendered().width(), job.image.rendered().height());
   print_assets(assets);
-  for (const AnimationUse& use : animations) fmt::print("animation  {}\n", text_of(use));
-  fmt::print("tasks      {}: {} to render ({} a tile), {} to assemble; {} dependencies\n",
-             e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
-  fmt::print("rays       {}{} primary and at most {} shadow rays a pixel and frame\n",
-             has_fine_sites(job) ? "at most " : "", e.primary_rays_per_pixel,
-             e.shadow_rays_per_pixel);
+  for (const AnimationUse& use : animations) say("animation  {}\n", text_of(use));
+  say("tasks      {}: {} to render ({} a tile), {} to assemble; {} dependencies\n", e.tasks(),
+      e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
+  say("rays       {}{} primary and at most {} shadow rays a pixel and frame\n",
+      has_fine_sites(job) ? "at most " : "", e.primary_rays_per_pixel, e.shadow_rays_per_pixel);
   if (e.rounds > 1)
-    fmt::print("           in {}{} rounds\n", job.quality.adaptive_threshold ? "at most " : "",
-               e.rounds);
+    say("           in {}{} rounds\n", job.quality.adaptive_threshold ? "at most " : "", e.rounds);
   if (e.preroll_rounds > 0) {
-    fmt::print(
-        "preroll    {} rounds before frame {} that are not seen: it takes {:.3g} times as "
+    say("preroll    {} rounds before frame {} that are not seen: it takes {:.3g} times as "
         "long\n",
         e.preroll_rounds, job.frames.front(),
         1 + kPrerollShare * static_cast<double>(e.preroll_rounds) / static_cast<double>(e.rounds));
   }
   if (moves(job)) {
-    fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);
+    say("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);
   }
   if (e.state_bytes > 0) {
-    fmt::print(
-        "state      at most {:.0f} bytes a pixel\n",
+    say("state      at most {:.0f} bytes a pixel\n",
         static_cast<double>(e.state_bytes) / static_cast<double>(job.image.rendered().area()));
   }
-  fmt::print("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
+  say("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
   const StoreEstimate store = estimate_store(job, surface_share(job, *assets.scene));
-  fmt::print("store      {} at its fullest with one worker: states {}, tiles on their way {}\n",
-             total(store.total()), total(store.states), total(store.films + store.samples));
-  fmt::print("           at most {}, however many workers\n", total(bound_store(job).total()));
-  fmt::print("disk       frames take at most {}, {} each\n", total(e.frames * e.frame_bytes),
-             total(e.frame_bytes));
-  fmt::print("output     {}/{}\n", job.output.directory, job.output.pattern);
+  say("store      {} at its fullest with one worker: states {}, tiles on their way {}\n",
+      total(store.total()), total(store.states), total(store.films + store.samples));
+  say("           at most {}, however many workers\n", total(bound_store(job).total()));
+  say("disk       frames take at most {}, {} each\n", total(e.frames * e.frame_bytes),
+      total(e.frame_bytes));
+  say("output     {}/{}\n", job.output.directory, job.output.pattern);
   print_plates(job, assets.plates);
 }
 
 void print_settings(const std::vector<JobSetting>& settings) {
-  fmt::print("\n");
+  say("\n");
   for (const JobSetting& s : settings) {
-    fmt::print("{} {} = {}\n", s.given ? "given  " : "default", s.path, s.value);
+    say("{} {} = {}\n", s.given ? "given  " : "default", s.path, s.value);
   }
 }
 
@@ -229,9 +224,9 @@ Status write_preview(const CheckOptions& options, const JobSpec& job, const Scen
   if (options.picture.empty()) return {};
   BATON_TRY(write_png(options.picture, scene_preview(job, scene)));
   if (options.json) return {};
-  for (const std::string& line : object_lines(job, scene)) fmt::print("object     {}\n", line);
-  fmt::print("picture    {}: frame {} as the camera sees it, and from outside\n", options.picture,
-             job.frames.front());
+  for (const std::string& line : object_lines(job, scene)) say("object     {}\n", line);
+  say("picture    {}: frame {} as the camera sees it, and from outside\n", options.picture,
+      job.frames.front());
   return {};
 }
 
@@ -262,9 +257,9 @@ Result<ExitCode> run_check(const CheckOptions& options) {
   } else {
     print_text(job, estimate, assets, animations);
     if (job.sampling.method == Method::automatic)
-      fmt::print("pilot      before the first frame: {}\n", pilot_text(plan));
+      say("pilot      before the first frame: {}\n", pilot_text(plan));
     BATON_TRY(write_preview(options, job, *assets.scene));
-    for (const std::string& warning : warnings) fmt::print("warning    {}\n", warning);
+    for (const std::string& warning : warnings) say("warning    {}\n", warning);
     if (options.explain) print_settings(settings);
   }
   return ExitCode::ok;

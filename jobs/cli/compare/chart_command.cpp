@@ -10,6 +10,7 @@
 #include "jobs/auto/auto_pilot.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
+#include "jobs/cli/say.h"
 #include "jobs/study/study_report.h"
 #include "jobs/study/verdict.h"
 
@@ -77,9 +78,8 @@ Status settle_jobs(Study& study) {
 Result<ExitCode> run_chart(const ChartOptions& options) {
   BATON_ASSIGN(Study study, load_study(options.study));
   BATON_TRY(settle_jobs(study));
-  fmt::print(stderr, "study {}: {} scenes, {} methods, {} combinations with {} seeds each\n",
-             study.name, study.scenes.size(), study.methods.size(), study.cells.size(),
-             study.num_seeds);
+  tell("study {}: {} scenes, {} methods, {} combinations with {} seeds each\n", study.name,
+       study.scenes.size(), study.methods.size(), study.cells.size(), study.num_seeds);
   if (options.check_only) return ExitCode::ok;
 
   const fs::path output = fs::absolute(
@@ -93,9 +93,9 @@ Result<ExitCode> run_chart(const ChartOptions& options) {
   BATON_ASSIGN(const fs::path report, write_report(study, results, folder, output, machine_name()));
   const std::vector<CellSummary> rows = summarize_study(study, results);
   for (const Verdict& verdict : verdicts(study, results, rows)) {
-    fmt::print("{:<24} {}\n", study.scenes[verdict.scene].name + ":", verdict_text(study, verdict));
+    say("{:<24} {}\n", study.scenes[verdict.scene].name + ":", verdict_text(study, verdict));
   }
-  fmt::print("{}\n", report.string());
+  say("{}\n", report.string());
   return ExitCode::ok;
 }
 

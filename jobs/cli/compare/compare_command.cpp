@@ -16,6 +16,7 @@
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_argument.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
 #include "jobs/study/as_shown.h"
@@ -180,19 +181,17 @@ Status write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
 /// As people see it, in steps of 255.
 void print_noise(const std::vector<Compared>& jobs, std::size_t width) {
   constexpr double kSteps = 255;
-  fmt::print("{:<{}}  {:>7}  {:>8}  {:>8}  {:>11}  {:>8}  {:>9}  {:>6}\n", "noise", width, "linear",
-             "as shown", "darkest", "worst block", "99.9 %", "black", "FLIP");
+  say("{:<{}}  {:>7}  {:>8}  {:>8}  {:>11}  {:>8}  {:>9}  {:>6}\n", "noise", width, "linear",
+      "as shown", "darkest", "worst block", "99.9 %", "black", "FLIP");
   for (const Compared& compared : jobs) {
     const Noise& noise = compared.noise;
-    fmt::print(
-        "{:<{}}  {:>5.3g} %  {:>8.2f}  {:>8.2f}  {:>11.2f}  {:>8.1f}  {:>7.2g} %  {:>6.3f}\n",
+    say("{:<{}}  {:>5.3g} %  {:>8.2f}  {:>8.2f}  {:>11.2f}  {:>8.1f}  {:>7.2g} %  {:>6.3f}\n",
         compared.job.name, width, 100 * noise.relative, kSteps * std::sqrt(noise.shown.mse),
         kSteps * std::sqrt(noise.shown.darkest_mse),
         kSteps * std::sqrt(noise.shown.worst_block_mse), kSteps * noise.shown.percentile_99_9,
         100 * noise.shown.black, noise.flip);
   }
-  fmt::print(
-      "By two more seeds and their sites. linear: a pixel's standard deviation, rms, over the mean "
+  say("By two more seeds and their sites. linear: a pixel's standard deviation, rms, over the mean "
       "radiance.\n"
       "As shown, in steps of 255: after exposure and sRGB, rms over all pixels, the darkest "
       "quarter, the worst\n"
@@ -204,15 +203,15 @@ void print_noise(const std::vector<Compared>& jobs, std::size_t width) {
 void print_table(const std::vector<Compared>& jobs, bool with_noise, const fs::path& sheet) {
   std::size_t width = 5;
   for (const Compared& compared : jobs) width = std::max(width, compared.job.name.size());
-  fmt::print("{:<{}}  {:>9}  {:>11}  {}\n", "job", width, "CPU", "handed on", "frames");
+  say("{:<{}}  {:>9}  {:>11}  {}\n", "job", width, "CPU", "handed on", "frames");
   for (const Compared& compared : jobs) {
-    fmt::print("{:<{}}  {:>7.1f} s  {:>11}  {}/{}\n", compared.job.name, width,
-               compared.summary.stats.cpu_seconds, bytes_text(compared.summary.state_bytes),
-               compared.job.output.directory, compared.job.output.pattern);
+    say("{:<{}}  {:>7.1f} s  {:>11}  {}/{}\n", compared.job.name, width,
+        compared.summary.stats.cpu_seconds, bytes_text(compared.summary.state_bytes),
+        compared.job.output.directory, compared.job.output.pattern);
   }
-  fmt::print("handed on: sample state, packed, from frame to frame\n");
+  say("handed on: sample state, packed, from frame to frame\n");
   if (with_noise) print_noise(jobs, width);
-  fmt::print("sheet, a row for each job: {}\n", sheet.string());
+  say("sheet, a row for each job: {}\n", sheet.string());
 }
 
 fs::path output_folder(const CompareOptions& options) {

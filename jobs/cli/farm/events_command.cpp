@@ -10,6 +10,7 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -49,14 +50,17 @@ std::string event_line(const FarmEvent& event) {
     text += fmt::format(", attempt {}", event.task.attempt);
   if (!event.worker.empty()) text += "  " + event.worker;
   if (event.seconds > 0) text += fmt::format("  after {:.1f} s", event.seconds);
-  if (!event.actor.empty() && event.actor != event.worker) text += "  by " + event.actor;
+  if (!event.actor.empty() && event.actor != "worker " + event.worker)
+    text += "  by " + event.actor;
   if (!event.reason.empty()) text += ": " + event.reason;
   return text;
 }
 
 void print_events(const std::vector<FarmEvent>& events, bool json) {
-  for (const FarmEvent& event : events)
-    fmt::print("{}\n", json ? json_text(event_json(event)) : event_line(event));
+  for (const FarmEvent& event : events) {
+    if (json) fmt::print("{}\n", json_text(event_json(event)));
+    if (!json) say("{}\n", event_line(event));
+  }
   std::fflush(stdout);
 }
 
@@ -69,8 +73,8 @@ void print_forgotten(const std::vector<ForgottenEvents>& forgotten, bool json) {
                                     {"seconds", sum.seconds}}));
       ;
     } else {
-      fmt::print("before              {:<19}  {} times{}\n", farm_event_name(sum.kind), sum.count,
-                 sum.seconds > 0 ? fmt::format(", {:.1f} s together", sum.seconds) : "");
+      say("before              {:<19}  {} times{}\n", farm_event_name(sum.kind), sum.count,
+          sum.seconds > 0 ? fmt::format(", {:.1f} s together", sum.seconds) : "");
     }
   }
 }
@@ -86,7 +90,7 @@ Result<ExitCode> show_events(const EventsOptions& options) {
   print_forgotten(found.forgotten, options.json);
   print_events(found.events, options.json);
   if (std::ssize(found.events) >= options.count)
-    fmt::print(stderr, "these are the newest {}; --last N shows more\n", options.count);
+    tell("these are the newest {}; --last N shows more\n", options.count);
   question.query.is_newest = false;
   question.query.count = limits::kMaxEventsTold;
   while (options.follow) {

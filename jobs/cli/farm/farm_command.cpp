@@ -16,6 +16,7 @@
 #include "jobs/cli/farm/slurm_farm.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/render/render_session.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -118,15 +119,14 @@ Result<ExitCode> work(RenderSession& session, const RenderOptions& options,
     BATON_TRY(session.keep_running(tend_pilots));
     return ExitCode::ok;
   }
-  if (wanted->output.is_look)
-    fmt::print(stderr, "a look: frames go to {}\n", wanted->output.directory);
+  if (wanted->output.is_look) tell("a look: frames go to {}\n", wanted->output.directory);
   const bool restart = options.restart || options.from_frame;
   BATON_ASSIGN(const std::optional<JobStatus> status, session.render(*wanted, restart, [&] {
     tend_pilots();
     return false;
   }));
   if (status) return exit_code_of_stopped(*status);
-  fmt::print(stderr, "stopped; the same command goes on\n");
+  tell("stopped; the same command goes on\n");
   return ExitCode::cancelled;
 }
 
@@ -154,10 +154,10 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
   BATON_TRY(pilots.prepare());
   BATON_ASSIGN(RequestClient client, open.link.connect());
   BATON_ASSIGN(RequestClient watcher, open.link.connect());
-  fmt::print(stderr, "to look at the farm: baton farm status {}\n", link_arguments(open.link));
+  tell("to look at the farm: baton farm status {}\n", link_arguments(open.link));
   if (!wanted) {
-    fmt::print(stderr, "to hand in a job: baton job submit JOB {}\nCtrl-C ends the farm\n",
-               link_arguments({open.pilot_endpoint, open.link.key_file}));
+    tell("to hand in a job: baton job submit JOB {}\nCtrl-C ends the farm\n",
+         link_arguments({open.pilot_endpoint, open.link.key_file}));
   }
 
   RenderSession session(render, signals, std::move(open.farm), std::move(client));

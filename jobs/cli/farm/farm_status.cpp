@@ -11,6 +11,7 @@
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 
 namespace baton {
 namespace {
@@ -56,23 +57,22 @@ Crews find_crews(const std::vector<WorkerSummary>& workers) {
 }
 
 void print_status(const JobList& list, const Crews& crews) {
-  for (const ListedJob& job : list.jobs) fmt::print("{}\n", job_line(job));
-  fmt::print("{} jobs, {} tasks are ready\n\n", list.jobs.size(), list.tasks_ready);
-  if (!crews.silence.empty()) fmt::print("no word from Slurm: {}\n", crews.silence);
+  for (const ListedJob& job : list.jobs) say("{}\n", job_line(job));
+  say("{} jobs, {} tasks are ready\n\n", list.jobs.size(), list.tasks_ready);
+  if (!crews.silence.empty()) say("no word from Slurm: {}\n", crews.silence);
   for (const auto& [pilot, workers] : crews.pilots) {
     const auto print = [&pilot = pilot](const std::string& worker) {
-      fmt::print("pilot {:<10} {:<10} {:<10} {:>10} left  {}\n", pilot.id, pilot.state_text,
-                 pilot.node.empty() ? pilot.reason : pilot.node, pilot.time_left, worker);
+      say("pilot {:<10} {:<10} {:<10} {:>10} left  {}\n", pilot.id, pilot.state_text,
+          pilot.node.empty() ? pilot.reason : pilot.node, pilot.time_left, worker);
     };
     if (workers.empty()) print("no worker");
     for (const WorkerSummary& worker : workers) print(worker_lines(worker));
   }
   for (const auto& [id, worker] : crews.unknown_pilots)
-    fmt::print("pilot {:<10} {:<10} {:<10} {:>10}       {}\n", id, "", "not in the queue", "",
-               worker_lines(worker));
-  for (const WorkerSummary& worker : crews.others) fmt::print("{}\n", worker_lines(worker));
-  fmt::print("{} pilots, {} workers{}\n", crews.pilots.size(), list.workers.size(),
-             absent_counts(list));
+    say("pilot {:<10} {:<10} {:<10} {:>10}       {}\n", id, "", "not in the queue", "",
+        worker_lines(worker));
+  for (const WorkerSummary& worker : crews.others) say("{}\n", worker_lines(worker));
+  say("{} pilots, {} workers{}\n", crews.pilots.size(), list.workers.size(), absent_counts(list));
 }
 
 ordered_json status_json(const JobList& list, const Crews& crews) {
@@ -117,7 +117,7 @@ Result<ExitCode> show_status(const StatusOptions& options) {
 Result<bool> confirm(const std::string& question) {
   if (::isatty(STDIN_FILENO) == 0)
     return Error{ErrorKind::usage, question + ": not a terminal: say --yes"};
-  fmt::print(stderr, "{}? [y/N] ", question);
+  tell("{}? [y/N] ", question);
   std::string answer;
   std::getline(std::cin, answer);
   return answer == "y" || answer == "yes";
@@ -141,8 +141,7 @@ Result<ExitCode> stop(const StatusOptions& options) {
                                  2));
     return ExitCode::ok;
   }
-  fmt::print(
-      "the coordinator ends, and its {} workers with it; {} jobs go on when it is started "
+  say("the coordinator ends, and its {} workers with it; {} jobs go on when it is started "
       "again\n",
       list.workers.size(), list.jobs.size());
   return ExitCode::ok;

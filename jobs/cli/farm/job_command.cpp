@@ -19,6 +19,7 @@
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -53,9 +54,9 @@ void print_accepted(const JobAccepted& accepted, bool json) {
                                          {"plan", accepted.plan}},
                                         2));
   ;
-  fmt::print("{}\n", accepted.identity.id.hex());
-  if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
-  fmt::print(stderr, "{}", accepted.plan);
+  say("{}\n", accepted.identity.id.hex());
+  if (accepted.already_there) tell("an equal job is there already: it goes on\n");
+  tell("{}", accepted.plan);
 }
 
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
@@ -70,31 +71,30 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
                ask_until_done<JobAccepted>(client, SubmitJob{std::move(document), restart}));
   print_accepted(accepted, options.json);
   if (options.json) return ExitCode::ok;
-  if (job.output.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
+  if (job.output.is_look) tell("a look: frames go to {}\n", job.output.directory);
   if (job.quality.may_grow())
-    fmt::print(stderr, "rounds are added until quality.{} ends it\n",
-               job.quality.noise_threshold ? "noiseThreshold"
-               : job.quality.time_limit    ? "timeLimit"
-                                           : "maxRounds");
+    tell("rounds are added until quality.{} ends it\n", job.quality.noise_threshold
+                                                            ? "noiseThreshold"
+                                                        : job.quality.time_limit ? "timeLimit"
+                                                                                 : "maxRounds");
   return ExitCode::ok;
 }
 
 void print_detail(const ShownJob& job, bool json) {
   const JobDetail& detail = job.detail;
   if (json) return fmt::print("{}\n", json_text(detail_json(job), 2));
-  fmt::print("{}\n", job_line({job.identity, detail.summary, job.now}));
-  fmt::print("output     {}\n", detail.summary.output_directory);
-  if (!detail.summary.owner.empty()) fmt::print("owner      {}\n", detail.summary.owner);
-  fmt::print("{}", times_text(job.identity.times));
-  if (job.identity.version > 1) fmt::print("version    {}\n", job.identity.version);
-  if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
-  if (!job.locked.empty()) fmt::print("locked     {}\n", format_frames(job.locked));
-  fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
-  if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
-  if (!job.now.reason.empty() && detail.waits.empty())
-    fmt::print("because    {}\n", job.now.reason);
-  for (const std::string& note : detail.notes) fmt::print("warning    {}\n", note);
-  for (const std::string& failure : detail.failures) fmt::print("failure    {}\n", failure);
+  say("{}\n", job_line({job.identity, detail.summary, job.now}));
+  say("output     {}\n", detail.summary.output_directory);
+  if (!detail.summary.owner.empty()) say("owner      {}\n", detail.summary.owner);
+  say("{}", times_text(job.identity.times));
+  if (job.identity.version > 1) say("version    {}\n", job.identity.version);
+  if (!detail.frames_done.empty()) say("frames     {}\n", format_frames(detail.frames_done));
+  if (!job.locked.empty()) say("locked     {}\n", format_frames(job.locked));
+  say("{}{}", job_statistics(detail.summary), judgement_text(detail));
+  if (!detail.waits.empty()) say("waits      {}\n", detail.waits);
+  if (!job.now.reason.empty() && detail.waits.empty()) say("because    {}\n", job.now.reason);
+  for (const std::string& note : detail.notes) say("warning    {}\n", note);
+  for (const std::string& failure : detail.failures) say("failure    {}\n", failure);
 }
 
 Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
@@ -110,7 +110,7 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   std::string job = options.job;  // once it is found, its ID: others may take its name
   std::set<std::string> told;     // lines, each once: two faults may alternate
   const auto say = [&](const std::string& line) {
-    if (told.insert(line).second) fmt::print(stderr, "{}\n", line);
+    if (told.insert(line).second) tell("{}\n", line);
   };
   std::size_t num_grown = 0;  // decisions that were printed
   for (;;) {
@@ -129,8 +129,7 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
 
     // The newest decision is enough of what was decided before.
     if (!last_answer && answer->growth.size() > 1) num_grown = answer->growth.size() - 1;
-    for (const std::string& line : fresh_growth(*answer, num_grown))
-      fmt::print(stderr, "{}\n", line);
+    for (const std::string& line : fresh_growth(*answer, num_grown)) tell("{}\n", line);
     last_answer = Clock::now();
     job = answer->identity.id.hex();
     const JobDetail& detail = answer->detail;
@@ -155,7 +154,7 @@ void print_change(const ShownJob& before, const ShownJob& after, bool json) {
   print_detail(after, json);
   const JobStatus status = before.detail.summary.status;
   if (status != after.detail.summary.status) return;
-  fmt::print(stderr, "nothing changed: the job was {} before\n", job_status_name(status));
+  tell("nothing changed: the job was {} before\n", job_status_name(status));
 }
 
 /// M: CancelJob, PauseJob or ResumeJob.
@@ -163,7 +162,7 @@ template <class M>
 Result<ExitCode> change(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const ShownJob before, ask<ShownJob>(client, ShowJob{options.job}));
   BATON_ASSIGN(const ShownJob after, ask_until_done<ShownJob>(client, M{before.identity.id.hex()}));
-  fmt::print(stderr, "{}", after.detail.plan);
+  tell("{}", after.detail.plan);
   print_change(before, after, options.json);
   return ExitCode::ok;
 }
@@ -175,15 +174,15 @@ Result<ExitCode> lock(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const ShownJob after,
                ask_until_done<ShownJob>(
                    client, LockFrames{options.job, std::move(frames).value(), options.off}));
-  fmt::print(stderr, "frames {} are {}\n", which,
-             options.off ? "not locked any more" : "locked: they stay and count as done");
+  tell("frames {} are {}\n", which,
+       options.off ? "not locked any more" : "locked: they stay and count as done");
   print_detail(after, options.json);
   const JobStatus status = after.detail.summary.status;
   const bool may_go_on =
       status == JobStatus::cancelled || (status == JobStatus::failed && after.detail.waits.empty());
   if (may_go_on)
-    fmt::print(stderr, "the job is {}: baton job retry {} goes on with it\n",
-               job_status_name(status), after.identity.id.short_hex());
+    tell("the job is {}: baton job retry {} goes on with it\n", job_status_name(status),
+         after.identity.id.short_hex());
   return ExitCode::ok;
 }
 
@@ -195,7 +194,7 @@ Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const JobAccepted accepted,
                ask_until_done<JobAccepted>(
                    client, SubmitJob{std::move(document.json), false, /*keep_priority=*/true}));
-  fmt::print(stderr, "{}", accepted.plan);
+  tell("{}", accepted.plan);
   BATON_ASSIGN(const ShownJob after, ask<ShownJob>(client, ShowJob{before.identity.id.hex()}));
   print_change(before, after, options.json);
   return ExitCode::ok;
@@ -254,7 +253,7 @@ Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
     if (!deleted && !(is_others && options.all_ended)) return deleted.error();
     ++(is_others ? num_others : num_deleted);
     if (!shown.locked.empty())
-      fmt::print(stderr, "frames {} are not locked any more\n", format_frames(shown.locked));
+      tell("frames {} are not locked any more\n", format_frames(shown.locked));
   }
   if (options.json) {
     fmt::print(
@@ -262,10 +261,10 @@ Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
         json_text({{"deleted", num_deleted}, {"others", num_others}, {"locked", num_locked}}, 2));
     return ExitCode::ok;
   }
-  fmt::print("{} jobs are deleted; their frames stay\n", num_deleted);
-  if (num_others > 0) fmt::print("{} jobs of others stay\n", num_others);
+  say("{} jobs are deleted; their frames stay\n", num_deleted);
+  if (num_others > 0) say("{} jobs of others stay\n", num_others);
   if (num_locked > 0)
-    fmt::print("{} jobs with locked frames stay: each is deleted by its ID\n", num_locked);
+    say("{} jobs with locked frames stay: each is deleted by its ID\n", num_locked);
   return ExitCode::ok;
 }
 

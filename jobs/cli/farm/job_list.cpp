@@ -11,6 +11,7 @@
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -76,11 +77,10 @@ Result<ExitCode> list(const ListOptions& options) {
   const std::vector<ListedJob> jobs = chosen(options, since_ms, found.jobs);
   if (!options.json) {
     for (const ListedJob& job : jobs)
-      fmt::print("{}\n", options.is_long ? long_job_line(job) : job_line(job));
-    fmt::print("{} jobs, {} workers", jobs.size(), found.workers.size());
-    if (!all && found.num_ended > 0)
-      fmt::print("; --all shows {} that have ended", found.num_ended);
-    fmt::print("\n");
+      say("{}\n", options.is_long ? long_job_line(job) : job_line(job));
+    say("{} jobs, {} workers", jobs.size(), found.workers.size());
+    if (!all && found.num_ended > 0) say("; --all shows {} that have ended", found.num_ended);
+    say("\n");
     return ExitCode::ok;
   }
   ordered_json result = {{"jobs", ordered_json::array()}, {"workers", ordered_json::array()}};

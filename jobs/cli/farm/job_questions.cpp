@@ -11,6 +11,7 @@
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -42,7 +43,7 @@ Result<ExitCode> why(const WhyOptions& options) {
   for (const Reason& reason : chain.reasons) {
     // Whoever has a task may say nothing any more.
     follows = follows || (reason.kind == ReasonKind::silent && &reason != &chain.reasons.front());
-    fmt::print("{}{}\n", follows ? "  <- " : "", reason_line(reason));
+    say("{}{}\n", follows ? "  <- " : "", reason_line(reason));
     follows = !is_last(reason.kind);
   }
   return ExitCode::ok;
@@ -103,9 +104,9 @@ Result<ExitCode> show_tasks(const TasksOptions& options) {
     fmt::print("{}\n", json_text(rows, 2));
     return ExitCode::ok;
   }
-  for (const ListedTask& task : found.tasks) fmt::print("{}\n", task_line(task));
-  fmt::print("{} tasks{}\n", found.tasks.size(),
-             options.job.empty() ? " of jobs that have not ended" : "");
+  for (const ListedTask& task : found.tasks) say("{}\n", task_line(task));
+  say("{} tasks{}\n", found.tasks.size(),
+      options.job.empty() ? " of jobs that have not ended" : "");
   return ExitCode::ok;
 }
 
@@ -140,7 +141,7 @@ Result<ExitCode> set(const SetOptions& options) {
   if (options.json) {
     fmt::print("{}\n", json_text(detail_json(job), 2));
   } else {
-    fmt::print("{}\n", long_job_line({job.identity, job.detail.summary, job.now}));
+    say("{}\n", long_job_line({job.identity, job.detail.summary, job.now}));
   }
   return ExitCode::ok;
 }

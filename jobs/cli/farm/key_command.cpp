@@ -5,6 +5,7 @@
 
 #include "common/protocol/keys.h"
 #include "jobs/cli/commands.h"
+#include "jobs/cli/say.h"
 
 namespace baton {
 namespace {
@@ -16,8 +17,7 @@ struct KeyOptions {
 
 Result<ExitCode> create(const KeyOptions& options) {
   BATON_TRY(create_keys(options.folder));
-  fmt::print(
-      "{0}/server.key   for baton-coordinator\n{0}/worker.key   for every baton-worker\n"
+  say("{0}/server.key   for baton-coordinator\n{0}/worker.key   for every baton-worker\n"
       "{0}/viewer.key   for `baton`: looks only\n"
       "{0}/user.key     for `baton`: submits jobs and looks after its own\n"
       "{0}/admin.key    for `baton`: everything\n",
@@ -27,8 +27,7 @@ Result<ExitCode> create(const KeyOptions& options) {
 
 Result<ExitCode> add(const KeyOptions& options) {
   BATON_TRY(add_key(options.folder, options.speaker));
-  fmt::print("{}/{}.key   {}\n", options.folder, options.speaker.name,
-             role_name(options.speaker.role));
+  say("{}/{}.key   {}\n", options.folder, options.speaker.name, role_name(options.speaker.role));
   return ExitCode::ok;
 }
 

@@ -108,7 +108,7 @@ void SlurmFarm::carry_out(const SlurmOrders& orders, RequestClient& client) {
   }
   for (const std::string& worker : orders.drain) {
     spdlog::info("worker {} is sent home", worker);
-    const Result<JobList> told = ask<JobList>(client, DrainWorker{worker}, kAnswerPatience);
+    const Result<JobList> told = ask<JobList>(client, OrderWorker{worker}, kAnswerPatience);
     if (!told) {
       warn(told.error().message);
     } else {

@@ -5,6 +5,7 @@
 #include "jobs/cli/farm/job_questions.h"
 #include "jobs/cli/farm/worker_text.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 
 namespace baton {
 namespace {
@@ -14,7 +15,7 @@ using nlohmann::ordered_json;
 struct WorkerCommandOptions {
   CoordinatorLink link;
   std::string worker_id;
-  bool json = false;
+  bool json = false, off = false;
 };
 
 void print_workers(const JobList& found, bool json) {
@@ -26,14 +27,14 @@ void print_workers(const JobList& found, bool json) {
     }
     return fmt::print("{}\n", json_text(list, 2));
   }
-  for (const WorkerSummary& worker : found.workers) fmt::print("{}\n", worker_lines(worker));
+  for (const WorkerSummary& worker : found.workers) say("{}\n", worker_lines(worker));
   for (const auto* const absent : {&found.turned_away, &found.lost}) {
-    for (const AbsentWorker& worker : *absent) fmt::print("{}\n", absent_line(worker));
+    for (const AbsentWorker& worker : *absent) say("{}\n", absent_line(worker));
   }
-  fmt::print("{} workers{}\n", found.workers.size(), absent_counts(found));
+  say("{} workers{}\n", found.workers.size(), absent_counts(found));
 }
 
-/// question: ListJobs or DrainWorker.
+/// question: ListJobs or OrderWorker.
 Result<ExitCode> ask_for_workers(const WorkerCommandOptions& options, const Message& question) {
   BATON_ASSIGN(RequestClient client, options.link.connect());
   BATON_ASSIGN(const JobList found, ask<JobList>(client, question));
@@ -49,6 +50,8 @@ void add_worker_command(CLI::App& app, ExitCode& code) {
   worker->footer(
       "Examples:\n"
       "  baton worker list --coordinator tcp://farm:5570\n"
+      "  baton worker hold node7-1234         somebody needs its machine for an hour\n"
+      "  baton worker hold node7-1234 --off\n"
       "  baton worker drain node7-1234        before its machine goes down");
 
   // No two commands share an option: see add_job_command().
@@ -68,8 +71,16 @@ void add_worker_command(CLI::App& app, ExitCode& code) {
       [](const WorkerCommandOptions&) { return ListJobs{}; });
   const auto [drain, drained] =
       add("drain", "Lets a worker finish what it renders, then end; its other tasks go to others",
-          [](const WorkerCommandOptions& options) { return DrainWorker{options.worker_id}; });
+          [](const WorkerCommandOptions& options) { return OrderWorker{options.worker_id}; });
   drain->add_option("NAME", drained->worker_id, "as listed")->required();
+  const auto [hold, held] =
+      add("hold", "Lets a worker finish what it has, and gives it nothing new; it stays connected",
+          [](const WorkerCommandOptions& options) {
+            return OrderWorker{options.worker_id,
+                               options.off ? WorkerOrder::release : WorkerOrder::hold};
+          });
+  hold->add_option("NAME", held->worker_id, "as listed")->required();
+  hold->add_flag("--off", held->off, "gives it tasks again");
 }
 
 }  // namespace baton

@@ -56,6 +56,7 @@ ordered_json worker_json(const WorkerSummary& worker) {
           {"threads", worker.num_threads},
           {"leases", worker.tasks.size()},
           {"draining", worker.is_draining},
+          {"held", worker.is_held},
           {"secondsSilent", worker.silent_s},
           {"build", worker.build},
           {"renderer", worker.renderer},

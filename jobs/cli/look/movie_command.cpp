@@ -7,6 +7,7 @@
 #include "jobs/cli/display.h"
 #include "jobs/cli/look/movie_encoder.h"
 #include "jobs/cli/look/numbered_frames.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/signals.h"
 
 namespace baton {
@@ -109,8 +110,8 @@ Result<ExitCode> run_movie(const MovieOptions& options) {
   ImageSink sink(out, rate);
   BATON_ASSIGN(const std::optional<std::string> how, show_frames(folder, options, sink));
   if (!how) return ExitCode::cancelled;
-  fmt::print("{}  {} frames{}, {}\n", out.string(), folder.frames.size(),
-             is_movie_name(out) ? fmt::format(" at {} a second", rate) : "", *how);
+  say("{}  {} frames{}, {}\n", out.string(), folder.frames.size(),
+      is_movie_name(out) ? fmt::format(" at {} a second", rate) : "", *how);
   return ExitCode::ok;
 }
 

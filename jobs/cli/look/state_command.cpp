@@ -10,6 +10,7 @@
 #include "common/state/source_names.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/json_text.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -93,19 +94,19 @@ ordered_json report_json(const StateReport& report) {
 void print_report(const StateReport& report) {
   const SampleState& state = report.state;
   const PixelRect& rect = state.rect;
-  fmt::print("picture    {}\n", state.picture.hex());
-  fmt::print("tile       {}, pixels [{}, {}) x [{}, {})\n", state.tile, rect.x0, rect.x1, rect.y0,
-             rect.y1);
-  fmt::print("frame      index {}\n", state.step);
-  fmt::print("particles  {} a pixel\n", state.num_particles);
-  fmt::print("size       {} bytes, {:.1f} a pixel\n", report.file_bytes, bytes_per_pixel(report));
+  say("picture    {}\n", state.picture.hex());
+  say("tile       {}, pixels [{}, {}) x [{}, {})\n", state.tile, rect.x0, rect.x1, rect.y0,
+      rect.y1);
+  say("frame      index {}\n", state.step);
+  say("particles  {} a pixel\n", state.num_particles);
+  say("size       {} bytes, {:.1f} a pixel\n", report.file_bytes, bytes_per_pixel(report));
   for (const SectionInfo& s : report.sections) {
-    fmt::print("section    {} {:>10} bytes stored, {:>10} raw\n", tag_text(s.tag), s.stored_bytes,
-               s.raw_bytes);
+    say("section    {} {:>10} bytes stored, {:>10} raw\n", tag_text(s.tag), s.stored_bytes,
+        s.raw_bytes);
   }
   for (std::size_t i = 0; i < kSourceNames.size(); ++i) {
-    fmt::print("source     {:<10} {:>8}  {:>6}\n", kSourceNames[i], report.sources[i],
-               percent_text(report.sources[i], state.num_pixels()));
+    say("source     {:<10} {:>8}  {:>6}\n", kSourceNames[i], report.sources[i],
+        percent_text(report.sources[i], state.num_pixels()));
   }
 
   // A bar of 40 characters is all pixels with a surface.
@@ -113,9 +114,9 @@ void print_report(const StateReport& report) {
   const std::uint64_t lit = state.num_pixels() - report.sources[0];
   for (std::size_t i = 0; i < kEssBins; ++i) {
     const std::uint64_t count = report.ess_histogram[i];
-    fmt::print("ess / N    {:.3f}..{:.3f} {:>8}  {:>6} {}\n", double(i) / kEssBins,
-               double(i + 1) / kEssBins, count, percent_text(count, lit),
-               std::string(lit == 0 ? 0 : count * 40 / lit, '#'));
+    say("ess / N    {:.3f}..{:.3f} {:>8}  {:>6} {}\n", double(i) / kEssBins,
+        double(i + 1) / kEssBins, count, percent_text(count, lit),
+        std::string(lit == 0 ? 0 : count * 40 / lit, '#'));
   }
 }
 
@@ -142,13 +143,13 @@ ordered_json pixel_json(const SampleState& state, std::int32_t x, std::int32_t y
 }
 
 void print_pixel(const ordered_json& pixel) {
-  fmt::print("pixel      {}, {}: {}, Lns {}, Lns when fresh {}, ESS {:.2f}\n",
-             pixel["x"].get<int>(), pixel["y"].get<int>(), pixel["source"].get<std::string>(),
-             pixel["lns"].get<float>(), pixel["lnsFresh"].get<float>(), pixel["ess"].get<double>());
+  say("pixel      {}, {}: {}, Lns {}, Lns when fresh {}, ESS {:.2f}\n", pixel["x"].get<int>(),
+      pixel["y"].get<int>(), pixel["source"].get<std::string>(), pixel["lns"].get<float>(),
+      pixel["lnsFresh"].get<float>(), pixel["ess"].get<double>());
   for (const ordered_json& particle : pixel["particles"]) {
     const auto w = particle["direction"].get<std::vector<float>>();
-    fmt::print("particle   weight {:.6f}  direction {:+.5f} {:+.5f} {:+.5f}  site {}\n",
-               particle["weight"].get<float>(), w[0], w[1], w[2], particle["site"].get<int>());
+    say("particle   weight {:.6f}  direction {:+.5f} {:+.5f} {:+.5f}  site {}\n",
+        particle["weight"].get<float>(), w[0], w[1], w[2], particle["site"].get<int>());
   }
 }
 
@@ -183,7 +184,7 @@ Result<ExitCode> verify(const StateOptions& options) {
   std::string faults;
   for (const std::string& file : options.files) {
     const Result<StateReport> report = load_state(file);
-    if (report) fmt::print("{}: ok, {:.1f} bytes a pixel\n", file, bytes_per_pixel(*report));
+    if (report) say("{}: ok, {:.1f} bytes a pixel\n", file, bytes_per_pixel(*report));
     if (!report) faults += (faults.empty() ? "" : "\n") + report.error().message;
   }
   if (!faults.empty()) return Error{ErrorKind::corrupt, faults};

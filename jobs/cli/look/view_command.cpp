@@ -3,6 +3,7 @@
 #include "common/image/image_io.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/display.h"
+#include "jobs/cli/say.h"
 
 namespace baton {
 namespace {
@@ -30,7 +31,7 @@ Result<ExitCode> run_view(const ViewOptions& options) {
     return Error{shown.error().kind, fmt::format("{}: {}", options.frame, shown.error().message)};
   const fs::path path = options.out.empty() ? default_output(options) : fs::path(options.out);
   BATON_TRY(write_png(path, shown->image));
-  fmt::print("{}  {}x{}, {}\n", path.string(), shown->image.width, shown->image.height, shown->how);
+  say("{}  {}x{}, {}\n", path.string(), shown->image.width, shown->image.height, shown->how);
   return ExitCode::ok;
 }
 

@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "jobs/cli/text.h"
+#include "jobs/cli/job_summary.h"
 
 namespace baton {
 namespace {
@@ -13,34 +13,30 @@ constexpr std::chrono::seconds kLineInterval{5};
 
 }  // namespace
 
-std::string Progress::line(const JobSummary& job, TimePoint now) const {
+std::string Progress::line(const JobSummary& job, const Eta& eta, TimePoint now) const {
   std::string text = fmt::format("frames {}/{}  tasks {}/{}", job.frames_done, job.frames_total,
                                  job.tasks_done, job.tasks_total);
   if (!start_ || job.tasks_done <= start_->tasks_done) return text;
 
-  // Frames finish late, as a task renders several: the time left comes from the tasks.
   const double seconds = std::chrono::duration<double>(now - start_->time).count();
-  const auto tasks = static_cast<double>(job.tasks_done - start_->tasks_done);
   text += fmt::format("  {:.2f} frames/s  {:.1f} tasks/s",
-                      (job.frames_done - start_->frames_done) / seconds, tasks / seconds);
-  if (job.tasks_done < job.tasks_total) {
-    const auto left = static_cast<double>(job.tasks_total - job.tasks_done);
-    text += fmt::format("  ETA {}", duration_text(left * seconds / tasks));
-  }
+                      (job.frames_done - start_->frames_done) / seconds,
+                      static_cast<double>(job.tasks_done - start_->tasks_done) / seconds);
+  if (job.tasks_done < job.tasks_total) text += "  " + eta_text(eta);
   if (job.attempts_lost > 0) text += fmt::format("  {} attempts lost", job.attempts_lost);
   return text;
 }
 
-void Progress::update(const JobSummary& job, TimePoint now) {
+void Progress::update(const JobSummary& job, const Eta& eta, TimePoint now) {
   if (!start_) start_ = Start{now, job.tasks_done, job.frames_done};
   const bool last = !is_open(job.status);
   if (terminal_) {
     // Erase to the end of the line: the text before may have been longer.
-    fmt::print(stderr, "\r{}\x1b[K", line(job, now));
+    fmt::print(stderr, "\r{}\x1b[K", line(job, eta, now));
     std::fflush(stderr);
     line_open_ = true;
   } else if (last || !last_shown_ || now - *last_shown_ >= kLineInterval) {
-    fmt::print(stderr, "{}\n", line(job, now));
+    fmt::print(stderr, "{}\n", line(job, eta, now));
     last_shown_ = now;
   }
 }

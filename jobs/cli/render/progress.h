@@ -16,13 +16,14 @@ class Progress {
 
   explicit Progress(bool terminal) : terminal_(terminal) {}
 
-  void update(const JobSummary& job, TimePoint now);
+  /// eta: as the farm has it.
+  void update(const JobSummary& job, const Eta& eta, TimePoint now);
   /// Leaves the line, so that other output starts on a new one.
   void finish();
 
-  /// "frames 12/48  tasks 340/2160  3.2 frames/s  ETA 12s". Rates count what was done since the
-  /// first update, so that a resumed job does not look faster than it is.
-  std::string line(const JobSummary& job, TimePoint now) const;
+  /// "frames 12/48  tasks 340/2160  3.2 frames/s  ETA 12s (10s to 15s)". Rates count what was done
+  /// since the first update, so that a resumed job does not look faster than it is.
+  std::string line(const JobSummary& job, const Eta& eta, TimePoint now) const;
 
  private:
   struct Start {

@@ -8,6 +8,7 @@
 #include "jobs/cli/display.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/render/render_watch.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -39,7 +40,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   }
   const std::optional<JobStatus>& status = *rendered;
   if (status && options.keep_running) {
-    fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", session.endpoint());
+    tell("the coordinator still answers at {}; Ctrl-C ends it\n", session.endpoint());
     BATON_TRY(session.keep_running());
   }
   if (!status) spdlog::info("stopping; finished work is kept");
@@ -48,7 +49,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
 
   std::string place = options.work_directory.empty() ? "" : " --work-dir " + options.work_directory;
   if (options.from_frame) place += fmt::format(" --from-frame {}", *options.from_frame);
-  fmt::print(stderr, "to go on: baton render {}{}\n", command_text(options.job), place);
+  tell("to go on: baton render {}{}\n", command_text(options.job), place);
   return ExitCode::cancelled;
 }
 

@@ -13,6 +13,7 @@
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
 #include "jobs/cli/render/progress.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -23,21 +24,21 @@ using Clock = std::chrono::steady_clock;
 
 /// Each failure ends with the command that replays its tile alone.
 void print_failures(const JobDetail& detail) {
-  for (const std::string& failure : detail.failures) fmt::print(stderr, "failure: {}\n", failure);
+  for (const std::string& failure : detail.failures) tell("failure: {}\n", failure);
 }
 
 void print_result(const JobSpec& job, const JobDetail& detail, double seconds) {
-  fmt::print("job        {} in {:.1f} s\n", job_status_name(detail.summary.status), seconds);
-  fmt::print("frames     {} of {} in {}/{}\n", detail.summary.frames_done,
-             detail.summary.frames_total, job.output.directory, job.output.pattern);
-  fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
+  say("job        {} in {:.1f} s\n", job_status_name(detail.summary.status), seconds);
+  say("frames     {} of {} in {}/{}\n", detail.summary.frames_done, detail.summary.frames_total,
+      job.output.directory, job.output.pattern);
+  say("{}{}", job_statistics(detail.summary), judgement_text(detail));
 }
 
 /// A sheet that cannot be made is no failure of the job.
 void write_sheet(const FrameSheet& sheet, const DisplayOptions& display, bool json) {
   const Result<std::optional<std::filesystem::path>> path = sheet.write(display);
   if (!path) return spdlog::warn("no contact sheet: {}", path.error().message);
-  if (*path && !json) fmt::print("sheet      {}, {}\n", (*path)->string(), radiance_text(display));
+  if (*path && !json) say("sheet      {}, {}\n", (*path)->string(), radiance_text(display));
 }
 
 }  // namespace
@@ -98,7 +99,7 @@ Result<std::optional<ShownJob>> RenderSession::follow(const JobSpec& spec, const
       }
       for (const std::string& line : fresh_growth(*shown, num_grown)) {
         progress.finish();
-        fmt::print(stderr, "{}\n", line);
+        tell("{}\n", line);
       }
       // More sweeps make all frames anew.
       if (version != shown->detail.summary.version) {
@@ -106,7 +107,7 @@ Result<std::optional<ShownJob>> RenderSession::follow(const JobSpec& spec, const
         progress = Progress(::isatty(STDERR_FILENO) == 1);
         sheet = FrameSheet(spec);
       }
-      progress.update(shown->detail.summary, Clock::now());
+      progress.update(shown->detail.summary, shown->now.eta, Clock::now());
       if (!shown->detail.waits.empty() && waits.empty() &&
           !((shown->detail.lacks_room || shown->lacks_renderer) && farm_.is_own())) {
         progress.finish();
@@ -152,7 +153,7 @@ Result<std::optional<ShownJob>> RenderSession::render_document(
     BATON_ASSIGN(const std::optional<JobAccepted> accepted,
                  ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{document, restart}));
     if (!accepted) return std::optional<ShownJob>();
-    fmt::print(stderr, "{}", accepted->plan);
+    tell("{}", accepted->plan);
     BATON_ASSIGN(std::optional<ShownJob> shown,
                  follow(job, accepted->identity.id, sheet, interrupted));
     // By what the workers render is known once they are there: then what they cannot go on with is
@@ -181,8 +182,8 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
   if (shown->lacks_renderer && farm_.is_own())
     return Error{ErrorKind::version, "the job waits for " + shown->detail.waits};
   if (status == JobStatus::paused || shown->detail.lacks_room)
-    fmt::print(stderr, "{}: the job waits for {}\nto go on: the same command\n",
-               status == JobStatus::paused ? "paused" : "stopped", shown->detail.waits);
+    tell("{}: the job waits for {}\nto go on: the same command\n",
+         status == JobStatus::paused ? "paused" : "stopped", shown->detail.waits);
   std::fflush(stdout);
   if (exit_code_of(shown->detail) == ExitCode::io) return Error{ErrorKind::io, shown->detail.waits};
   return std::optional(status);
@@ -193,7 +194,7 @@ Status RenderSession::write_png_of(const JobSpec& job) const {
   BATON_ASSIGN(RgbImage image, read_rgb_image(frame_path(job, FrameIndex(0)), ExrWindow::seen));
   const Display shown = display_radiance(std::move(image), options_.display);
   BATON_TRY(write_png(options_.out, shown.image));
-  if (!options_.json) fmt::print("picture    {}, {}\n", options_.out, shown.how);
+  if (!options_.json) say("picture    {}, {}\n", options_.out, shown.how);
   return {};
 }
 

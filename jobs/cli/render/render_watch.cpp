@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/scene/settle/settle_motion.h"
+#include "jobs/cli/say.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {
@@ -79,8 +80,8 @@ Result<ExitCode> watch_and_render(const RenderOptions& options) {
       if (!rendered) outcome = rendered.error();
       stop = rendered && !*rendered && !changed;
     }
-    if (!outcome.ok()) fmt::print(stderr, "{}\n", outcome.error().message);
-    if (!stop && !changed) fmt::print(stderr, "waiting for changes; Ctrl-C ends\n");
+    if (!outcome.ok()) tell("{}\n", outcome.error().message);
+    if (!stop && !changed) tell("waiting for changes; Ctrl-C ends\n");
     while (!stop && !interrupted()) {
       BATON_TRY(session.tend());
       stop = signals.stop_requested_within(kFarmPollInterval);

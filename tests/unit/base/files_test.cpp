@@ -85,6 +85,34 @@ TEST_F(FilesTest, AVerifiedFileGetsItsNameOnlyAfterTheCheck) {
   EXPECT_EQ(num_files(), 1);
 }
 
+// A link on the way may lead elsewhere since the path was looked at: the folder that is held
+// counts.
+TEST_F(FilesTest, NothingIsWrittenOutsideTheRoots) {
+  const fs::path inside = folder_ / "in", outside = folder_ / "out", link = inside / "frames";
+  fs::create_directories(inside / "real");
+  fs::create_directories(outside);
+  const Roots roots{folder_ / "none", inside};
+  fs::create_directory_symlink(outside, link);
+  const auto publish = [&](const fs::path& file) {
+    return write_file_verified(
+        file, as_bytes_view("x"), [](const fs::path&) -> Result<bool> { return true; }, roots);
+  };
+  for (const fs::path& file :
+       {link / "a", outside / "a", inside / "../out/a", folder_ / "a", folder_ / "in2/a"}) {
+    const Status refused = write_file_atomic(file, as_bytes_view("x"), roots);
+    ASSERT_FALSE(refused.ok()) << file;
+    EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
+    EXPECT_THAT(refused.error().message, HasSubstr("outside what this farm allows"));
+    EXPECT_FALSE(publish(file).ok()) << file;
+  }
+  EXPECT_TRUE(fs::is_empty(outside));
+  fs::remove(link);
+  fs::create_directory_symlink(inside / "real", link);
+  EXPECT_TRUE(write_file_atomic(link / "a", as_bytes_view("x"), roots).ok());
+  EXPECT_TRUE(publish(inside / "new/folder/a").ok());
+  EXPECT_EQ(read_text_file(inside / "real/a", 10).value(), "x");
+}
+
 // It may have come since somebody looked, or be there for other machines alone.
 TEST_F(FilesTest, WhatMayNotBeReplacedStays) {
   const fs::path file = folder_ / "frame";

@@ -154,6 +154,10 @@ TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {
       {R"("metadata": {"odd\nkey": "1"})",
        "$.metadata: expected names of 1 to 4096 bytes without control characters, got "
        "\"odd\\nkey\""},
+      {"\"metadata\": {\"back\": \"\u202egpj.exr\"}",
+       "$.metadata.back: expected a text of 1 to 4096 bytes without control characters, got "},
+      {"\"metadata\": {\"window\": \"\u009b2J\"}",
+       "$.metadata.window: expected a text of 1 to 4096 bytes without control characters, got "},
       {R"("metadata": {"odd key": 1})",
        "$.metadata[\"odd key\"]: expected a text, such as \"1\", got 1"},
       {R"("frames": "4-1")", "$.frames: expected a last frame not before the first, got \"4-1\""},
@@ -245,9 +249,9 @@ TEST(JobJson, ADocumentIsWhole) {
                              .digest = {},
                              .picture = {}};
   const std::string text = with_sweeps(document, 2);
-  EXPECT_TRUE(expect_written_document(text));
-  EXPECT_FALSE(expect_written_document(text + " "));
-  EXPECT_THAT(expect_written_document(" " + text).error().message, HasSubstr("as `baton` writes"));
+  EXPECT_TRUE(parse_written_document(text));
+  EXPECT_FALSE(parse_written_document(text + " "));
+  EXPECT_THAT(parse_written_document(" " + text).error().message, HasSubstr("as `baton` writes"));
   const std::size_t scene = text.find("\"scene\":{");
   ASSERT_NE(scene, std::string::npos);
   const std::string filed = text.substr(0, scene) + R"("scene":"/etc/hostname","more":{)" +

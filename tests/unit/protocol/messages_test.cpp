@@ -53,7 +53,7 @@ const JobSummary kSummary{
 const JobIdentity kIdentity{{9}, 2, {10, 11, 12}};
 const TaskPlace kPlace{TaskKind::second_pass, FrameNumber(3), FrameNumber(4), 5, 6};
 const UsualTime kUsual{1.5, 0.5, 7};
-const JobNow kNow{JobActivity::waiting, "space"};
+const JobNow kNow{JobActivity::waiting, "space", {1, 2, 3}};
 
 /// One of each, in the order of the type codes, no member left at its default.
 const std::vector<Message>& examples() {
@@ -85,6 +85,7 @@ const std::vector<Message>& examples() {
                 2,
                 {{{9}, kPlace, 1.5, kUsual}},
                 true,
+                true,
                 WorkerActivity::draining,
                 2.5,
                 "baton 1",
@@ -111,7 +112,7 @@ const std::vector<Message>& examples() {
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
-      DrainWorker{"w"},
+      OrderWorker{"w", WorkerOrder::hold},
       Drain{},
       ReportReceived{kLease},
       DeleteJob{"def"},
@@ -151,7 +152,7 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 17);
+  static_assert(kProtocolVersion == 18);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
@@ -190,7 +191,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x11\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x12\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -231,12 +232,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{18};
+  frames[0][5] = std::byte{19};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 18, this program speaks 17"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 19, this program speaks 18"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

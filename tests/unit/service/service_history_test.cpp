@@ -137,7 +137,7 @@ TEST_F(HistoryTest, AWorkerThatWasToldToFinishIsShownSo) {
   worker.hello();
   worker.expect<WorkerWelcome>();
   EXPECT_FALSE(ask<JobList>(service.endpoint(), ListJobs{}).workers.at(0).is_draining);
-  EXPECT_TRUE(ask<JobList>(service.endpoint(), DrainWorker{"w"}).workers.at(0).is_draining);
+  EXPECT_TRUE(ask<JobList>(service.endpoint(), OrderWorker{"w"}).workers.at(0).is_draining);
   EXPECT_EQ(count(events(service.endpoint()), FarmEventKind::worker_drained), 1u);
   worker.hello();  // connected again
   worker.expect<WorkerWelcome>();

@@ -246,6 +246,49 @@ TEST_F(FileTableTest, AFileIsReadOnceAndAgainWhenItHasChanged) {
   EXPECT_EQ(table.judge(file, frame).writer, "somebody");
 }
 
+// One of megabytes takes seconds, and everybody else would wait for it.
+TEST_F(FileTableTest, LargeDocumentsAreParsedBesideTheLoop) {
+  std::atomic<int> num_woken = 0;
+  FileWaits waits({}, [&] { ++num_woken; });
+  FileTable table;
+  const TimePoint now = std::chrono::steady_clock::now();
+  const auto from = [](const std::string& peer, const std::string& speaker) {
+    const ByteView bytes = as_bytes_view(peer);
+    return Incoming{PeerId(bytes.begin(), bytes.end()), Message(ListJobs{}), {Role::user, speaker}};
+  };
+  const auto large = [](char letter) {
+    return std::string(2 * FileWaits::kParsedAtOnceBytes, letter);
+  };
+  using Parsing = FileWaits::Parsing;
+  EXPECT_EQ(waits.parse(from("1", "anna"), {{}, {"{}", "small"}}, now), Parsing::done);
+  EXPECT_EQ(waits.parse(from("1", "anna"), {{}, {large('a')}}, now), Parsing::waits);
+  EXPECT_EQ(waits.parse(from("1", "anna"), {{}, {large('a')}}, now), Parsing::waits) << "again";
+  EXPECT_EQ(waits.parse(from("2", "anna"), {{}, {large('b')}}, now), Parsing::no_place)
+      << "one of a speaker at a time";
+  EXPECT_EQ(waits.parse(from("3", "ben"), {{}, {large('c'), document}}, now), Parsing::waits);
+
+  std::vector<Incoming> ready;
+  const auto deadline = now + kPatience;
+  while (ready.size() < 2 && std::chrono::steady_clock::now() < deadline) {
+    for (Incoming& message : waits.take_ready(table)) {
+      // What it waited for is at hand while it is handled: why it is no document, too.
+      const bool is_anna = message.speaker.name == "anna";
+      const SharedDocument known = document_at_hand(digest_of(large(is_anna ? 'a' : 'c')));
+      ASSERT_NE(known, nullptr);
+      EXPECT_FALSE(known->ok());
+      EXPECT_EQ(waits.parse(message, {{}, {large(is_anna ? 'a' : 'c')}}, now), Parsing::done);
+      ready.push_back(std::move(message));
+    }
+    std::this_thread::sleep_for(1ms);
+  }
+  ASSERT_EQ(ready.size(), 2u);
+  EXPECT_GE(num_woken, 2);
+  const SharedDocument parsed = document_at_hand(digest_of(document));
+  ASSERT_NE(parsed, nullptr);
+  EXPECT_TRUE(parsed->ok());
+  EXPECT_EQ(waits.parse(from("2", "anna"), {{}, {large('b')}}, now), Parsing::waits);
+}
+
 // Written by a machine whose clock is ahead, changed in place, and its date put back.
 TEST_F(FileTableTest, ADateInTheFutureHidesNoChange) {
   FileTable table;

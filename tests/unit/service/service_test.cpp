@@ -242,14 +242,49 @@ TEST_F(ServiceTest, AWorkerIsDrainedByItsName) {
   FakeWorker worker(service.endpoint(), store(), job, "mill");
   worker.hello();
   worker.expect<WorkerWelcome>();
-  EXPECT_THAT(ask<JobList>(service.endpoint(), DrainWorker{"mill"}).workers, SizeIs(1));
+  EXPECT_THAT(ask<JobList>(service.endpoint(), OrderWorker{"mill"}).workers, SizeIs(1));
   worker.expect<Drain>();
-  const Error unknown = refused(service.endpoint(), DrainWorker{"mil"});
+  const Error unknown = refused(service.endpoint(), OrderWorker{"mil"});
   EXPECT_EQ(unknown.kind, ErrorKind::bad_input);
   EXPECT_EQ(unknown.message, "worker 'mil': no worker has this name");
 }
 
 // A name is for people: two processes of one name on one host work side by side.
+TEST_F(ServiceTest, AHeldWorkerGetsNothingUntilItIsReleased) {
+  std::optional<RunningService> service(options);
+  ask<JobAccepted>(service->endpoint(), SubmitJob{document});
+  {
+    FakeWorker worker(service->endpoint(), store(), job);
+    worker.hello();
+    worker.do_one_task();
+    const OrderWorker hold{"w", WorkerOrder::hold};
+    const WorkerSummary held = ask<JobList>(service->endpoint(), hold).workers.at(0);
+    EXPECT_TRUE(held.is_held);
+    EXPECT_EQ(held.activity, WorkerActivity::held);
+    worker.say(LeaseRequest{1});
+    worker.say(Heartbeat{});
+    worker.expect<Heartbeat>();
+    EXPECT_FALSE(worker.answers<LeaseGrant>(kHeartbeat));
+    EXPECT_THAT(ask<ReasonChain>(service->endpoint(), AskWhy{{}, "w"}).reasons.back().text,
+                HasSubstr("worker w is held, and takes nothing new"));
+    EXPECT_THAT(refused(service->endpoint(), OrderWorker{"x", WorkerOrder::hold}).message,
+                HasSubstr("no worker has this name"));
+  }
+
+  // Whoever is the coordinator then.
+  service.reset();
+  service.emplace(options);
+  FakeWorker worker(service->endpoint(), store(), job);
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  worker.say(LeaseRequest{1});
+  EXPECT_FALSE(worker.answers<LeaseGrant>(2 * kHeartbeat));
+  EXPECT_TRUE(ask<JobList>(service->endpoint(), ListJobs{}).workers.at(0).is_held);
+  const OrderWorker release{"w", WorkerOrder::release};
+  EXPECT_FALSE(ask<JobList>(service->endpoint(), release).workers.at(0).is_held);
+  worker.do_one_task();
+}
+
 TEST_F(ServiceTest, TwoWorkersOfOneNameWorkSideBySide) {
   const RunningService service(options);
   FakeWorker first(service.endpoint(), store(), job), second(service.endpoint(), store(), job);
@@ -358,6 +393,21 @@ TEST_F(ServiceTest, BadMessagesAreRefusedAndHarmNobody) {
 
 // Each lease that a worker names is looked up and answered: millions would stop the farm for
 // seconds.
+// One key could say hello under new names as fast as it can write, each a line of the history.
+TEST_F(ServiceTest, AConnectionIsOneWorkersAndNamesAreShort) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello({}, 1);
+  worker.expect<WorkerWelcome>();
+  worker.hello({}, 2);
+  EXPECT_THAT(worker.expect<Refused>().message, HasSubstr("this connection is another worker's"));
+  worker.hello({}, 1);
+  worker.expect<WorkerWelcome>();
+  FakeWorker wordy(service.endpoint(), store(), job, std::string(257, 'w'));
+  wordy.hello({}, 3);
+  EXPECT_THAT(wordy.expect<Refused>().message, HasSubstr("a name of at most 256 bytes"));
+}
+
 TEST_F(ServiceTest, AWorkerCannotHaveMoreLeasesInHandThanItMay) {
   const RunningService service(options);
   const std::vector<LeaseId> leases(

@@ -1,0 +1,63 @@
+#include "coordinator/service/eta_book.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace baton {
+namespace {
+
+constexpr std::chrono::seconds kLeastInterval{2};
+/// A forecast takes this share of the coordinator's time at most.
+constexpr int kShareOfTime = 20;
+
+double seconds_of(TimePoint::duration time) { return std::chrono::duration<double>(time).count(); }
+
+}  // namespace
+
+void EtaBook::add(const Scheduler::Job& job, const TellLeaseEnd& end, TimePoint now) {
+  if (end.end != LeaseEnd::done) return;
+  const TaskKey& key = end.lease.task;
+  const JobGraph& graph = job.tasks.graph();
+  const bool is_workers_first = begun_.emplace(end.lease.job, end.worker).second;
+  const bool is_render = key.kind == TaskKind::render;
+  times_[end.lease.job].add({.kind = key.kind,
+                             .tile = key.kind == TaskKind::assemble ? 0 : key.tile,
+                             .steps = steps_of(graph, key),
+                             .seconds = seconds_of(now - end.granted_at),
+                             .is_first = is_workers_first || (is_render && key.run() == Run(0))});
+}
+
+void EtaBook::find(const Scheduler& scheduler, int num_slots, TimePoint now) {
+  const auto is_gone = [&](const Digest& job) { return scheduler.find_job(job) == nullptr; };
+  std::erase_if(times_, [&](const auto& entry) { return is_gone(entry.first); });
+  std::erase_if(begun_, [&](const auto& entry) { return is_gone(entry.first); });
+  std::vector<Digest> versions;
+  std::vector<ForecastJob> jobs;
+  for (const Digest& version : scheduler.in_turn()) {
+    const Scheduler::Job& job = *scheduler.find_job(version);
+    if (!job.waits.empty() || scheduler.lacks_renderer(version)) continue;
+    versions.push_back(version);
+    jobs.push_back({job.tasks.graph(), job.tasks.book(), times_[version]});
+    for (const TaskIndex task : scheduler.leases().of_job(version))
+      jobs.back().in_work.emplace_back(
+          task, seconds_of(now - scheduler.leases().at({version, task}).granted_at));
+  }
+  const std::vector<Eta> etas = forecast(jobs, num_slots);
+  found_.clear();
+  for (std::size_t j = 0; j < jobs.size(); ++j) found_[versions[j]] = etas[j];
+  found_at_ = now;
+  const auto took = std::chrono::steady_clock::now() - now;
+  find_again_ = now + std::max<TimePoint::duration>(kLeastInterval, kShareOfTime * took);
+}
+
+Eta EtaBook::of(const Digest& version, const Scheduler& scheduler, int num_slots, TimePoint now) {
+  if (now >= find_again_ || !found_.contains(version)) find(scheduler, num_slots, now);
+  const auto found = found_.find(version);
+  if (found == found_.end() || !found->second.is_known()) return {};
+  const double passed = seconds_of(now - found_at_);
+  const auto left = [&](double seconds) { return std::max(seconds - passed, 0.0); };
+  const Eta& eta = found->second;
+  return {left(eta.early_s), left(eta.likely_s), std::max(left(eta.late_s), 1e-3)};
+}
+
+}  // namespace baton

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "common/job/activity.h"
+#include "coordinator/schedule/forecast.h"
+#include "coordinator/schedule/scheduler.h"
+#include "coordinator/schedule/task_times.h"
+
+namespace baton {
+
+/// How long the tasks of open jobs take, and when the jobs will be done (forecast.h). What an
+/// earlier coordinator saw is not known.
+class EtaBook {
+ public:
+  /// A lease of the job has ended.
+  void add(const Scheduler::Job& job, const TellLeaseEnd& end, TimePoint now);
+
+  /// Of a job that runs. num_slots: tasks that the workers have in hand at once. What was found is
+  /// told for some seconds, less what has passed, since a forecast of many tasks takes its time.
+  Eta of(const Digest& version, const Scheduler& scheduler, int num_slots, TimePoint now);
+
+ private:
+  void find(const Scheduler& scheduler, int num_slots, TimePoint now);
+
+  std::map<Digest, TaskTimes> times_;
+  std::set<std::pair<Digest, std::string>> begun_;  ///< workers that have done a task of a job
+  std::map<Digest, Eta> found_;
+  TimePoint found_at_{}, find_again_{};
+};
+
+}  // namespace baton
