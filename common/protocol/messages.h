@@ -320,6 +320,7 @@ struct ForgottenEvents {
 struct EventList {
   std::vector<FarmEvent> events;
   std::vector<ForgottenEvents> forgotten = {};  ///< of the job that was asked for
+  std::string logs = {};                        ///< the folder of the workers' logs
 };
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind

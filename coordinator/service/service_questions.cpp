@@ -6,6 +6,7 @@
 
 #include "common/base/archive.h"
 #include "common/base/limits.h"
+#include "common/store/worker_logs.h"
 #include "coordinator/service/answers.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/service.h"
@@ -87,6 +88,7 @@ Status Service::receive(const PeerId& peer, const ListEvents& message) {
     if (!version && (!deleted || any.empty())) return farm_.refuse(peer, version.error());
   }
   EventList list;
+  list.logs = worker_logs(farm_.store_directory.parent_path()).string();
   BATON_ASSIGN(list.events, farm_.journal.events(query));
   if (!query.job.empty()) {
     BATON_ASSIGN(const auto sums, farm_.journal.event_sums(query.job));

@@ -20,6 +20,10 @@ def saved_jobs(farm):
     return sorted((farm.work_folder / "store/jobs").glob("*.json"))
 
 
+def listed_workers(farm):
+    return json.loads(farm.baton("worker", "list", "--json").stdout)
+
+
 def nobody_listens(programs, folder):
     """Found out in about two seconds, not after the patience for a busy coordinator."""
     endpoint = f"tcp://127.0.0.1:{free_port()}"
@@ -162,6 +166,47 @@ def a_drained_worker_ends_and_its_work_goes_on(programs, folder):
               "an unknown worker was drained")
         farm.start_worker()
         farm.baton("job", "wait", job)
+
+
+def a_held_worker_waits(programs, folder):
+    """It stays, renders nothing new until it is let go, and whoever asks is told; a coordinator that comes later holds it, too."""
+    with Farm(programs, folder / "farm", workers=1) as farm:
+        wait_until(lambda: listed_workers(farm), "the worker is listed")
+        farm.baton("worker", "hold", "worker0")
+        job = farm.submit(small_job(folder))
+        held = listed_workers(farm)[0]
+        check_equal((held["activity"], held["held"], held["leases"]), ("held", True, 0), "the worker")
+        check("is held, and takes nothing new" in farm.baton("worker", "why", "worker0").stdout, "it does not say why")
+        check("is held" in farm.baton("job", "why", job).stdout, "the job does not say why")
+        farm.coordinator.kill()
+        farm.start_coordinator()
+        wait_until(lambda: [worker["activity"] for worker in listed_workers(farm)] == ["held"], "it is held again")
+        farm.baton("job", "wait", job, "--timeout", "1", expect=TIMEOUT)
+        farm.baton("worker", "hold", "worker0", "--off")
+        farm.wait_for(job)
+        check(re.search(r"worker held .*\n(.*\n)*.*worker released", farm.baton("farm", "events").stdout), "events")
+
+
+def what_workers_say_is_joined_with_what_happened(programs, folder):
+    with Farm(programs, folder / "farm", workers=1) as farm:
+        job = farm.submit(small_job(folder))
+        follow = Process([farm.programs.path("baton"), "job", "log", job, "--follow", "--coordinator", farm.endpoint], folder / "follow.log")
+        farm.wait_for(job)
+        text = farm.baton("job", "log", job).stdout
+        for part in ("  task done ", "  job done ", f"  worker0  debug: job {job[:8]}: ", ", attempt 1: done"):
+            check(part in text, f"{part!r} is not in\n{text}")
+        times = [line[:20] for line in text.splitlines()]
+        check_equal(times, sorted(times), "times of lines")
+        rows = [json.loads(line) for line in farm.baton("job", "log", job, "--json").stdout.splitlines()]
+        said = [row["text"] for row in rows if "level" in row]
+        check(len(said) > 4 and all(f"job {job[:8]}" in line for line in said), f"lines of workers: {said}")
+        check_equal(len([row for row in rows if row.get("kind") == "task done"]), sum(line.endswith(": done") for line in said), "ends")
+        wait_until(lambda: "job done" in follow.log() and ", attempt 1: done" in follow.log(), "it is followed")
+        follow.kill()
+        hidden = farm.baton("job", "log", job, "--logs", folder / "nowhere")
+        check("not seen from here, so only the events are shown" in hidden.stderr and "job done" in hidden.stdout, hidden.stderr)
+        check_equal(len(farm.baton("job", "log", job, "--last", "3").stdout.splitlines()), 3, "lines of --last 3")
+        check_equal((farm.work_folder / "logs").stat().st_mode & 0o077, 0, "rights of others in the logs")
 
 
 def a_failed_job_is_retried(programs, folder):

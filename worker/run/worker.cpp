@@ -18,6 +18,7 @@
 #include "common/base/build.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/base/log.h"
 #include "common/base/patiently.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/plan/task_place.h"
@@ -25,6 +26,7 @@
 #include "common/math/instruction_set.h"
 #include "common/protocol/worker_channel.h"
 #include "common/store/folder_token.h"
+#include "common/store/worker_logs.h"
 #include "worker/pass/render_context.h"
 #include "worker/run/crash_handler.h"
 #include "worker/run/render_threads.h"
@@ -45,6 +47,11 @@ std::string host_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown-host";
 }
 
+std::string name_of_worker(const WorkerOptions& options) {
+  return options.worker_id.empty() ? fmt::format("{}-{}", host_name(), ::getpid())
+                                   : options.worker_id;
+}
+
 SessionOptions session_options(const WorkerOptions& options) {
   WorkerHello identity;
   identity.host = host_name();
@@ -52,8 +59,7 @@ SessionOptions session_options(const WorkerOptions& options) {
   // Host and process id do not tell containers apart.
   std::random_device random;
   identity.instance = std::uint64_t{random()} << 32 | random();
-  identity.worker_id = options.worker_id.empty() ? fmt::format("{}-{}", identity.host, identity.pid)
-                                                 : options.worker_id;
+  identity.worker_id = name_of_worker(options);
   identity.num_threads = options.num_threads;
   identity.build = build_identity();
   identity.renderer = describe_renderer();
@@ -193,6 +199,7 @@ class Worker {
   Worker(WorkerChannel channel, const WorkerOptions& options)
       : channel_(std::move(channel)),
         session_(session_options(options), now()),
+        worker_id_(name_of_worker(options)),
         machine_(options.machine),
         jobs_(
             [this](const JobDocument& document) {
@@ -214,7 +221,7 @@ class Worker {
       // Results first: they free slots that the tick then asks leases for.
       for (const LeaseId& lease : threads_.take_executed()) step(TaskExecuted{lease});
       for (TaskEnded& ended : threads_.collect()) {
-        log_failure(ended);
+        log_end(ended);
         step(std::move(ended));
       }
       take_packed();
@@ -260,7 +267,7 @@ class Worker {
           Error{
               ErrorKind::timeout,
               "ran for longer than maxSecondsPerTask, or loaded its job for a quarter of an hour"}};
-      log_failure(ended);
+      log_end(ended);
       step(std::move(ended));
     }
     if (!watch_.is_stuck(now())) return;
@@ -318,11 +325,18 @@ class Worker {
     }
     store_directory_ = action.directory;
     store_ = std::make_shared<BlobStore>(std::move(store).value());
+    if (!std::exchange(logs_to_file_, true)) {
+      const std::filesystem::path file = worker_log(folder.parent_path(), worker_id_);
+      if (const Status opened = log_to_file(file); !opened)
+        spdlog::warn("no log for `baton job log`: {}", opened.error().message);
+    }
     spdlog::info("the coordinator has answered, blobs are in {}", folder.string());
   }
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.grant.lease.job);
     const bool missing = !job->has_document();
+    spdlog::debug("job {}: {}: taken", name_of(action.grant.lease.job),
+                  place_of_task(action.grant.lease));
     threads_.submit({std::move(action.grant), std::move(job), store_});
     if (missing) step(DocumentMissing{action.grant.lease.job});
   }
@@ -357,28 +371,37 @@ class Worker {
     const auto found = names_.find(job);
     return found == names_.end() ? job.short_hex() : found->second;
   }
-  void log_failure(const TaskEnded& ended) const {
-    if (ended.result || ended.result.error().kind == ErrorKind::cancelled) return;
-    spdlog::error("job {}: {} failed: {}", name_of(ended.lease.job), place_of_task(ended.lease),
-                  ended.result.error().message);
+  void log_end(const TaskEnded& ended) const {
+    const std::string what =
+        fmt::format("job {}: {}", name_of(ended.lease.job), place_of_task(ended.lease));
+    if (ended.result) {
+      spdlog::debug("{}: done", what);
+    } else if (ended.result.error().kind == ErrorKind::cancelled) {
+      spdlog::debug("{}: stopped", what);
+    } else {
+      spdlog::error("{} failed: {}", what, ended.result.error().message);
+    }
   }
   /// As the coordinator says it, once the job is loaded.
   std::string place_of_task(const LeaseId& lease) const {
+    const std::string attempt = fmt::format(", attempt {}", lease.attempt);
     for (const LoadedJobPtr& loaded : jobs_.loaded()) {
       if (loaded->digest == lease.job)
-        return place_text(place_of(loaded->job, Timeline(loaded->job), lease.task));
+        return place_text(place_of(loaded->job, Timeline(loaded->job), lease.task)) + attempt;
     }
-    return fmt::format("{}, tile {}", task_name(lease.task.kind), lease.task.tile);
+    return fmt::format("{}, tile {}{}", task_name(lease.task.kind), lease.task.tile, attempt);
   }
 
   WorkerChannel channel_;
   Session session_;
+  const std::string worker_id_;
   const Machine machine_;
   AssetShelf shelf_;  ///< what jobs_ loads from
   JobCache jobs_;
   std::map<Digest, std::string> names_;  ///< of jobs whose document has come
   std::shared_ptr<BlobStore> store_;
   std::filesystem::path store_directory_;
+  bool logs_to_file_ = false;
   std::optional<Leave> leave_;
   NoteLog notes_;
   TaskWatch watch_;

@@ -8,15 +8,13 @@
 #include "common/base/limits.h"
 #include "common/base/utc.h"
 #include "jobs/cli/coordinator_link.h"
-#include "jobs/cli/job_summary.h"
+#include "jobs/cli/farm/events_text.h"
 #include "jobs/cli/json_text.h"
 #include "jobs/cli/say.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
 namespace {
-
-using nlohmann::ordered_json;
 
 constexpr std::chrono::milliseconds kFollowInterval{500};
 
@@ -27,34 +25,6 @@ struct EventsOptions {
   int count = 100;
   bool follow = false, json = false;
 };
-
-ordered_json event_json(const FarmEvent& event) {
-  ordered_json row = {{"sequence", event.sequence},
-                      {"time", utc_iso(event.time_ms)},
-                      {"kind", farm_event_name(event.kind)}};
-  if (!event.actor.empty()) row["actor"] = event.actor;
-  if (!event.job.empty()) row["job"] = event.job.hex();
-  if (event.has_task) row.update(place_json(event.task));
-  if (!event.worker.empty()) row["worker"] = event.worker;
-  if (!event.reason.empty()) row["reason"] = event.reason;
-  if (event.seconds > 0) row["seconds"] = event.seconds;
-  return row;
-}
-
-std::string event_line(const FarmEvent& event) {
-  std::string text =
-      fmt::format("{}  {:<19}", utc_text(event.time_ms), farm_event_name(event.kind));
-  if (!event.job.empty()) text += fmt::format("  job {}", event.job.short_hex());
-  if (event.has_task) text += "  " + place_text(event.task);
-  if (event.has_task && event.task.attempt > 1)
-    text += fmt::format(", attempt {}", event.task.attempt);
-  if (!event.worker.empty()) text += "  " + event.worker;
-  if (event.seconds > 0) text += fmt::format("  after {:.1f} s", event.seconds);
-  if (!event.actor.empty() && event.actor != "worker " + event.worker)
-    text += "  by " + event.actor;
-  if (!event.reason.empty()) text += ": " + event.reason;
-  return text;
-}
 
 void print_events(const std::vector<FarmEvent>& events, bool json) {
   for (const FarmEvent& event : events) {
@@ -71,7 +41,6 @@ void print_forgotten(const std::vector<ForgottenEvents>& forgotten, bool json) {
       fmt::print("{}\n", json_text({{"kind", farm_event_name(sum.kind)},
                                     {"forgotten", sum.count},
                                     {"seconds", sum.seconds}}));
-      ;
     } else {
       say("before              {:<19}  {} times{}\n", farm_event_name(sum.kind), sum.count,
           sum.seconds > 0 ? fmt::format(", {:.1f} s together", sum.seconds) : "");

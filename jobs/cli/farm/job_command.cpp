@@ -15,6 +15,7 @@
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/job_list.h"
+#include "jobs/cli/farm/job_log.h"
 #include "jobs/cli/farm/job_questions.h"
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
@@ -314,6 +315,7 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   add_list_command(*job, code);
   add("show", "One job: progress, statistics, failures", "ID", show);
   add_job_questions(*job, code);
+  add_job_log(*job, code);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
       change<PauseJob>);
   add("resume", "Goes on with a paused job", "ID", change<ResumeJob>);
