@@ -247,7 +247,7 @@ def a_task_that_takes_too_long_fails(programs, folder):
         check_equal((shown["tasksFailed"], shown["attemptsLost"]), (1, 1), "failures")
         words = "ran for longer than maxSecondsPerTask"
         check(words in shown["failures"][0] and words in farm.coordinator.log(), "the reason is not named")
-        check(re.search(rf"job {job[:8]}: frames? [\d-]+, tile \d+ failed: {words}", worker.log()), worker.log())
+        check(re.search(rf"job {job[:8]}: frames? [\d-]+, tile \d+, attempt \d+ failed: {words}", worker.log()), worker.log())
         wait_until(lambda: [file.stem for file in saved_jobs(farm)] == [shown["document"]], "the failed job's document stays")
 
 

@@ -335,8 +335,11 @@ class Worker {
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.grant.lease.job);
     const bool missing = !job->has_document();
-    spdlog::debug("job {}: {}: taken", name_of(action.grant.lease.job),
-                  place_of_task(action.grant.lease));
+    if (steps_.size() >= limits::kMaxLeasesPerWorker) steps_.clear();
+    steps_[action.grant.lease] = action.grant.steps;
+    if (!missing)
+      spdlog::debug("job {}: {}: taken", name_of(action.grant.lease.job),
+                    place_of_task(action.grant.lease));
     threads_.submit({std::move(action.grant), std::move(job), store_});
     if (missing) step(DocumentMissing{action.grant.lease.job});
   }
@@ -371,7 +374,7 @@ class Worker {
     const auto found = names_.find(job);
     return found == names_.end() ? job.short_hex() : found->second;
   }
-  void log_end(const TaskEnded& ended) const {
+  void log_end(const TaskEnded& ended) {
     const std::string what =
         fmt::format("job {}: {}", name_of(ended.lease.job), place_of_task(ended.lease));
     if (ended.result) {
@@ -381,13 +384,17 @@ class Worker {
     } else {
       spdlog::error("{} failed: {}", what, ended.result.error().message);
     }
+    steps_.erase(ended.lease);
   }
   /// As the coordinator says it, once the job is loaded.
   std::string place_of_task(const LeaseId& lease) const {
     const std::string attempt = fmt::format(", attempt {}", lease.attempt);
+    // Which steps the coordinator's runs have, its grants alone say.
+    const auto steps = steps_.find(lease);
     for (const LoadedJobPtr& loaded : jobs_.loaded()) {
-      if (loaded->digest == lease.job)
-        return place_text(place_of(loaded->job, Timeline(loaded->job), lease.task)) + attempt;
+      if (loaded->digest == lease.job && steps != steps_.end())
+        return place_text(place_of(loaded->job, Timeline(loaded->job), lease.task, steps->second)) +
+               attempt;
     }
     return fmt::format("{}, tile {}{}", task_name(lease.task.kind), lease.task.tile, attempt);
   }
@@ -399,6 +406,7 @@ class Worker {
   AssetShelf shelf_;  ///< what jobs_ loads from
   JobCache jobs_;
   std::map<Digest, std::string> names_;  ///< of jobs whose document has come
+  std::map<LeaseId, StepSpan> steps_;    ///< of tasks in hand
   std::shared_ptr<BlobStore> store_;
   std::filesystem::path store_directory_;
   bool logs_to_file_ = false;

@@ -12,5 +12,8 @@ namespace baton {
 /// Which frames a task of the job works on; timeline: the job's.
 TaskPlace place_of(const JobSpec& job, const Timeline& timeline, const TaskKey& task,
                    std::uint32_t attempt = 0);
+/// For those who do not know the job's runs (JobPlan): steps: of a task that renders.
+TaskPlace place_of(const JobSpec& job, const Timeline& timeline, const TaskKey& task,
+                   const StepSpan& steps, std::uint32_t attempt = 0);
 
 }  // namespace baton
