@@ -34,7 +34,7 @@ class DocumentShelf {
   }
 
  private:
-  static constexpr std::size_t kMostBytes = 64u << 20;
+  static constexpr std::size_t kMostBytes = 16u << 20;
   struct Recent {
     SharedDocument document;
     std::size_t bytes = 0;
@@ -85,8 +85,13 @@ std::string resolve_folder(const std::string& folder) {
 Result<std::vector<Digest>> jobs_in_folder(Journal& journal, const std::string& folder,
                                            const std::optional<std::string>& name) {
   const std::string wanted = resolve_folder(folder);
-  return journal.jobs_in([&](const std::string& known) { return resolve_folder(known) == wanted; },
-                         name);
+  return journal.jobs_in(
+      [&](const std::string& known) {
+        // One disk may be mounted at two places.
+        std::error_code error;
+        return resolve_folder(known) == wanted || fs::equivalent(known, wanted, error);
+      },
+      name);
 }
 
 Result<NeededDocuments> documents_in_folder(Journal& journal, const std::string& folder) {

@@ -177,6 +177,13 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
                         {ErrorKind::bad_input,
                          fmt::format("a worker needs a name of at most {} bytes", kMaxWorkerName)});
   }
+  for (const std::string* const text : {&message.host, &message.build, &message.renderer}) {
+    if (text->size() > limits::kMaxTextLength)
+      return farm_.refuse(peer, {ErrorKind::bad_input,
+                                 fmt::format("host, build and renderer of a worker have at most {} "
+                                             "bytes",
+                                             limits::kMaxTextLength)});
+  }
   const WorkerHello* const before = farm_.peers.hello_of(farm_.peers.worker_of(peer));
   if (before != nullptr && before->instance != message.instance)
     return farm_.refuse(peer, {ErrorKind::bad_input, "this connection is another worker's"});

@@ -39,6 +39,47 @@ Status expect_folder(const std::filesystem::path& folder) {
                            there.string(), error ? ": " + error.message() : " is no folder")};
 }
 
+/// Strictly. Both are paths without links.
+bool is_within(const std::filesystem::path& inner, const std::filesystem::path& outer) {
+  const auto [end, rest] = std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end());
+  return end == outer.end() && rest != inner.end();
+}
+
+/// Error, usage: a user's key has no right to write into the folder: it lies in one that a job of
+/// another user has, where it could stand in the place of frames, or in the coordinator's own, or
+/// is named as what Baton keeps beside frames.
+Status expect_free_place(FarmCore& farm, const Speaker& speaker, const std::string& directory) {
+  const std::filesystem::path folder = resolve_folder(directory);
+  const bool is_reserved = std::ranges::any_of(
+      folder, [](const auto& part) { return part.string().starts_with(".baton-"); });
+  if (is_reserved)
+    return Error{ErrorKind::usage, directory + ": names that begin with .baton- are reserved"};
+  if (speaker.name.empty() || speaker.role != Role::user) return {};
+  const std::filesystem::path work = resolve_folder(farm.options.work_dir.string());
+  if (folder == work || is_within(folder, work))
+    return Error{ErrorKind::usage, directory + ": lies in the coordinator's work folder"};
+  BATON_ASSIGN(const std::vector<Digest> around,
+               farm.journal.jobs_in([&](const std::string& known) {
+                 return is_within(folder, resolve_folder(known));
+               }));
+  for (const Digest& job : around) {
+    if (const Status own = farm.check_own(speaker, job); !own)
+      return Error{ErrorKind::usage, fmt::format("{}: lies in the output folder of another job; {}",
+                                                 directory, own.error().message)};
+  }
+  return {};
+}
+
+/// Whether the speaker may have such a job.
+Status check_rights(FarmCore& farm, const Speaker& speaker, const ParsedJobDocument& document) {
+  if (const Status within = check_roots(document, farm.options.roots); !within) {
+    spdlog::warn("refused: job '{}': {}", document.job.name, within.error().message);
+    return within;
+  }
+  BATON_TRY(check_priority(speaker, document.job.priority, farm.options.user_priority));
+  return expect_free_place(farm, speaker, document.job.output.directory);
+}
+
 void tell_lost(const std::string& job, const LostFiles& lost) {
   if (lost.tasks.empty()) return;
   spdlog::warn("job {}: {} is gone or has another size{}", job, lost.first,
@@ -194,13 +235,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   const SharedDocument submitted = share_document(message.json);
   Result<ParsedJobDocument> document = *submitted;
   if (!document) return farm_.refuse(peer, document.error());
-  if (const Status within = check_roots(*document, farm_.options.roots); !within) {
-    spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
-    return farm_.refuse(peer, within.error());
-  }
-  if (const Status may =
-          check_priority(speaker_, document->job.priority, farm_.options.user_priority);
-      !may)
+  if (const Status may = check_rights(farm_, speaker_, *document); !may)
     return farm_.refuse(peer, may.error());
   Result<NeededDocuments> others =
       documents_in_folder(farm_.journal, document->job.output.directory);

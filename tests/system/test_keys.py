@@ -129,6 +129,14 @@ def a_folder_is_its_owners(programs, folder):
         check("diagnostics.csv" in before, str(list(before)))
         beside = small(folder / "beside", output={"directory": str(folder / "job/frames"), "pattern": "mine.####.exr"})
         farm.refused("anna", "job", "submit", beside, says="belongs to 'user': user 'anna' may not change it")
+        # Nor a folder in it, which could stand where frames and marks belong.
+        for name in ("frame.0003.exr", "deep/er"):
+            inside = small(folder / "inside", output={"directory": str(folder / "job/frames" / name)})
+            farm.refused("anna", "job", "submit", inside, says="lies in the output folder of another job")
+        for who, place, says in (("anna", folder / "job/frames/.baton-locked/x", "are reserved"), ("admin", folder / ".baton-1/x", "are reserved"),
+                                 ("anna", farm.work_folder / "logs", "lies in the coordinator's work folder")):
+            farm.refused(who, "job", "submit", small(folder / "odd", output={"directory": str(place)}), says=says)
+        check(files() == before, "files of another user are others")
         farm.speak("admin", "job", "delete", job)
         for words in ([], ["--restart"]):
             answer = farm.speak("anna", "job", "submit", small(folder / "job", seed=8), *words, expect=None)

@@ -18,12 +18,12 @@ struct WorkerLogLine {
   std::string text;          ///< with its continuation lines
 };
 
-/// Reads what workers log about one job (common/store/worker_logs.h), as it comes: lines that have
-/// "job" and the short ID.
+/// Reads what workers log about one job (common/store/worker_logs.h), as it comes: lines that begin
+/// with "job" and the short ID: others may name files as they like.
 class WorkerLogReader {
  public:
   WorkerLogReader(std::filesystem::path folder, const JobId& job)
-      : folder_(std::move(folder)), wanted_("job " + job.short_hex()) {}
+      : folder_(std::move(folder)), wanted_("job " + job.short_hex() + ":") {}
 
   /// Whether the folder is seen from here.
   bool is_there() const;

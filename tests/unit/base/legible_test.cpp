@@ -26,6 +26,7 @@ TEST(Legible, ControlsAreEscaped) {
   EXPECT_EQ(legible_line("a\nb\r\t"), "a\\nb\\r\\t");
   EXPECT_EQ(legible_line("\x1b[31mred\x7f"), "\\x1b[31mred\\x7f");
   EXPECT_EQ(legible_line("\u0085\u2028\u202e"), "\\x85\\u2028\\u202e");
+  EXPECT_EQ(legible_line("\u061c\u200e\u200f"), "\\u061c\\u200e\\u200f");
   EXPECT_EQ(legible_line(std::string_view("\0x", 2)), "\\x00x");
   EXPECT_EQ(legible_text("\x1b[2J\n"), "\\x1b[2J\n");
   const std::string once = legible_line("a\n\x1b\xff");

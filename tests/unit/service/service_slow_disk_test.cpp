@@ -262,7 +262,6 @@ TEST_F(FileTableTest, LargeDocumentsAreParsedBesideTheLoop) {
   using Parsing = FileWaits::Parsing;
   EXPECT_EQ(waits.parse(from("1", "anna"), {{}, {"{}", "small"}}, now), Parsing::done);
   EXPECT_EQ(waits.parse(from("1", "anna"), {{}, {large('a')}}, now), Parsing::waits);
-  EXPECT_EQ(waits.parse(from("1", "anna"), {{}, {large('a')}}, now), Parsing::waits) << "again";
   EXPECT_EQ(waits.parse(from("2", "anna"), {{}, {large('b')}}, now), Parsing::no_place)
       << "one of a speaker at a time";
   EXPECT_EQ(waits.parse(from("3", "ben"), {{}, {large('c'), document}}, now), Parsing::waits);

@@ -403,6 +403,9 @@ TEST_F(ServiceTest, AConnectionIsOneWorkersAndNamesAreShort) {
   EXPECT_THAT(worker.expect<Refused>().message, HasSubstr("this connection is another worker's"));
   worker.hello({}, 1);
   worker.expect<WorkerWelcome>();
+  FakeWorker odd(service.endpoint(), store(), job, "odd");
+  odd.hello({}, 4, std::string(4097, 'r'));
+  EXPECT_THAT(odd.expect<Refused>().message, HasSubstr("at most 4096 bytes"));
   FakeWorker wordy(service.endpoint(), store(), job, std::string(257, 'w'));
   wordy.hello({}, 3);
   EXPECT_THAT(wordy.expect<Refused>().message, HasSubstr("a name of at most 256 bytes"));
