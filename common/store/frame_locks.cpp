@@ -49,6 +49,10 @@ fs::path lock_folder(const fs::path& folder) { return folder / ".baton-locked"; 
 Status record_locks(const fs::path& folder, const std::string& job, const FolderLocks& locks,
                     const Roots& roots) {
   const fs::path file = lock_folder(folder) / job;
+  std::error_code link_error;
+  if (fs::is_symlink(fs::symlink_status(lock_folder(folder), link_error)))
+    return Error{ErrorKind::io, lock_folder(folder).string() +
+                                    ": is a link, where Baton's own folder is expected"};
   BATON_ASSIGN(const FolderLocks before, read_locks(file));
   if (locks == before) return {};
   std::error_code error;

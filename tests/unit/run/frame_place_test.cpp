@@ -121,5 +121,17 @@ TEST_F(FramePlaceTest, NothingIsLockedInAFolderThatIsNotThere) {
   EXPECT_FALSE(fs::exists(folder / "unmounted"));
 }
 
+// Nothing is written, or removed, where a link in its place leads.
+TEST_F(FramePlaceTest, ALinkInPlaceOfTheLocksIsNotFollowed) {
+  ASSERT_TRUE(record_locks(folder, "a", {{"frame.exr"}}));
+  const fs::path elsewhere = folder / "elsewhere";
+  fs::rename(lock_folder(folder), elsewhere);
+  fs::create_directory_symlink(elsewhere, lock_folder(folder));
+  EXPECT_FALSE(record_locks(folder, "a", {}));
+  EXPECT_FALSE(record_locks(folder, "new", {{"frame.exr"}}));
+  EXPECT_TRUE(fs::exists(elsewhere / "a"));
+  EXPECT_FALSE(fs::exists(elsewhere / "new"));
+}
+
 }  // namespace
 }  // namespace baton
