@@ -101,7 +101,9 @@ def roles_decide_who_may_do_what(programs, folder):
         farm.start_coordinator()
         farm.refused("anna", "job", "delete", job, says="belongs to 'user'")
         farm.speak("admin", "job", "delete", job)
-        wait_until(lambda: "worker0" in farm.speak("admin", "worker", "list").stdout, "the worker is back")
+        # Until then it is listed, too: as lost.
+        wait_until(lambda: [worker["activity"] for worker in json.loads(farm.speak("admin", "worker", "list", "--json").stdout)] == ["idle"],
+                   "the worker is back")
         farm.speak("admin", "worker", "drain", "worker0")
         check_equal(farm.workers[0].wait(), OK, "exit code of the drained worker")
 
