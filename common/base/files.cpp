@@ -16,6 +16,7 @@
 
 #include "common/base/file_descriptor.h"
 #include "common/base/limits.h"
+#include "common/base/paths.h"
 
 namespace baton {
 namespace {
@@ -116,10 +117,8 @@ Status expect_within(const FileDescriptor& folder, const Roots& roots) {
   const fs::path found = fs::read_symlink(fmt::format("/proc/self/fd/{}", folder.number()), error);
   for (const fs::path& root : roots) {
     std::error_code none;
-    const fs::path within = fs::canonical(root, none);
-    const auto [end, rest] =
-        std::mismatch(within.begin(), within.end(), found.begin(), found.end());
-    if (!error && !none && end == within.end()) return {};
+    const fs::path allowed = fs::canonical(root, none);
+    if (!error && !none && lies_in(found, allowed)) return {};
   }
   return Error{ErrorKind::bad_input,
                fmt::format("{}: lies outside what this farm allows (--root)", found.string())};

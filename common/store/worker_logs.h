@@ -4,6 +4,7 @@
 #include <cctype>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace baton {
 
@@ -12,7 +13,8 @@ inline std::filesystem::path worker_logs(const std::filesystem::path& work_folde
   return work_folder / "logs";
 }
 
-/// The log of a worker. What a name has besides letters, digits and "._#-" becomes "_" there.
+/// The log of a worker: the first 200 bytes of its name, in which all but letters, digits and
+/// "._#-" becomes "_".
 inline std::filesystem::path worker_log(const std::filesystem::path& work_folder,
                                         std::string worker) {
   std::ranges::replace_if(
@@ -22,7 +24,8 @@ inline std::filesystem::path worker_log(const std::filesystem::path& work_folder
                std::string_view("._#-").find(static_cast<char>(c)) == std::string_view::npos;
       },
       '_');
-  return worker_logs(work_folder) / (worker + ".log");
+  constexpr std::size_t kMost = 200;
+  return worker_logs(work_folder) / (worker.substr(0, kMost) + ".log");
 }
 
 }  // namespace baton

@@ -27,34 +27,39 @@ void EtaBook::add(const Scheduler::Job& job, const TellLeaseEnd& end, TimePoint 
                              .is_first = is_workers_first || (is_render && key.run() == Run(0))});
 }
 
-void EtaBook::find(const Scheduler& scheduler, int num_slots, TimePoint now) {
-  const auto is_gone = [&](const Digest& job) { return scheduler.find_job(job) == nullptr; };
-  std::erase_if(times_, [&](const auto& entry) { return is_gone(entry.first); });
-  std::erase_if(begun_, [&](const auto& entry) { return is_gone(entry.first); });
+void EtaBook::forget(const Digest& version) {
+  times_.erase(version);
+  std::erase_if(begun_, [&](const auto& entry) { return entry.first == version; });
+}
+
+EtaBook::Found EtaBook::find(const Scheduler& scheduler, int num_slots, TimePoint now) const {
+  static const TaskTimes kNone;
   std::vector<Digest> versions;
   std::vector<ForecastJob> jobs;
   for (const Digest& version : scheduler.in_turn()) {
     const Scheduler::Job& job = *scheduler.find_job(version);
     if (!job.waits.empty() || scheduler.lacks_renderer(version)) continue;
+    const auto times = times_.find(version);
     versions.push_back(version);
-    jobs.push_back({job.tasks.graph(), job.tasks.book(), times_[version]});
+    jobs.push_back(
+        {job.tasks.graph(), job.tasks.book(), times == times_.end() ? kNone : times->second});
     for (const TaskIndex task : scheduler.leases().of_job(version))
       jobs.back().in_work.emplace_back(
           task, seconds_of(now - scheduler.leases().at({version, task}).granted_at));
   }
   const std::vector<Eta> etas = forecast(jobs, num_slots);
-  found_.clear();
-  for (std::size_t j = 0; j < jobs.size(); ++j) found_[versions[j]] = etas[j];
-  found_at_ = now;
   const auto took = std::chrono::steady_clock::now() - now;
-  find_again_ = now + std::max<TimePoint::duration>(kLeastInterval, kShareOfTime * took);
+  Found found{{}, now, now + std::max<TimePoint::duration>(kLeastInterval, kShareOfTime * took)};
+  for (std::size_t j = 0; j < jobs.size(); ++j) found.etas[versions[j]] = etas[j];
+  return found;
 }
 
-Eta EtaBook::of(const Digest& version, const Scheduler& scheduler, int num_slots, TimePoint now) {
-  if (now >= find_again_ || !found_.contains(version)) find(scheduler, num_slots, now);
-  const auto found = found_.find(version);
-  if (found == found_.end() || !found->second.is_known()) return {};
-  const double passed = seconds_of(now - found_at_);
+Eta EtaBook::of(const Digest& version, const Scheduler& scheduler, int num_slots,
+                TimePoint now) const {
+  if (now >= found_.again) found_ = find(scheduler, num_slots, now);
+  const auto found = found_.etas.find(version);
+  if (found == found_.etas.end() || !found->second.is_known()) return {};
+  const double passed = seconds_of(now - found_.at);
   const auto left = [&](double seconds) { return std::max(seconds - passed, 0.0); };
   const Eta& eta = found->second;
   return {left(eta.early_s), left(eta.likely_s), std::max(left(eta.late_s), 1e-3)};

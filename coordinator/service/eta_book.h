@@ -18,18 +18,23 @@ class EtaBook {
  public:
   /// A lease of the job has ended.
   void add(const Scheduler::Job& job, const TellLeaseEnd& end, TimePoint now);
+  /// A version of a job has ended.
+  void forget(const Digest& version);
 
   /// Of a job that runs. num_slots: tasks that the workers have in hand at once. What was found is
   /// told for some seconds, less what has passed, since a forecast of many tasks takes its time.
-  Eta of(const Digest& version, const Scheduler& scheduler, int num_slots, TimePoint now);
+  Eta of(const Digest& version, const Scheduler& scheduler, int num_slots, TimePoint now) const;
 
  private:
-  void find(const Scheduler& scheduler, int num_slots, TimePoint now);
+  struct Found {
+    std::map<Digest, Eta> etas;
+    TimePoint at{}, again{};
+  };
+  Found find(const Scheduler& scheduler, int num_slots, TimePoint now) const;
 
   std::map<Digest, TaskTimes> times_;
   std::set<std::pair<Digest, std::string>> begun_;  ///< workers that have done a task of a job
-  std::map<Digest, Eta> found_;
-  TimePoint found_at_{}, find_again_{};
+  mutable Found found_;
 };
 
 }  // namespace baton

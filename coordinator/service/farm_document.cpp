@@ -40,7 +40,7 @@ class DocumentShelf {
     std::size_t bytes = 0;
   };
   std::mutex mutex_;  ///< guards all below
-  std::map<Digest, std::weak_ptr<const Result<ParsedJobDocument>>> known_;
+  std::map<Digest, std::weak_ptr<const FarmDocument>> known_;
   std::list<Recent> recent_;  ///< the newest first
   std::size_t recent_bytes_ = 0;
 };
@@ -50,30 +50,27 @@ DocumentShelf& shelf() {
   return the_shelf;
 }
 
-template <class Parse>
-SharedDocument shelved(std::string_view text, Parse parse) {
-  const Digest digest = digest_of(text);
-  if (SharedDocument known = shelf().find(digest)) return known;
-  Result<ParsedJobDocument> document = parse(text);
-  if (document) {
-    const fs::path folder = document->job.output.directory;
-    if (!folder.has_filename()) document->job.output.directory = folder.parent_path().string();
-  }
-  auto shared = std::make_shared<const Result<ParsedJobDocument>>(std::move(document));
-  shelf().add(digest, shared, text.size());
-  return shared;
-}
-
 }  // namespace
 
 Result<ParsedJobDocument> parse_farm_document(std::string_view text) {
-  return *shelved(text, parse_job_document);
+  return share_document(text)->parsed;
 }
 
-SharedDocument document_at_hand(const Digest& digest) { return shelf().find(digest); }
+SharedDocument document_at_hand(const Digest& text) { return shelf().find(text); }
 
 SharedDocument share_document(std::string_view text) {
-  return shelved(text, parse_written_document);
+  const Digest digest = digest_of(text);
+  if (SharedDocument known = shelf().find(digest)) return known;
+  Result<ParsedJobDocument> parsed = parse_job_document(text);
+  Status written = parsed ? expect_written(*parsed, text) : Status(parsed.error());
+  if (parsed) {
+    const fs::path folder = parsed->job.output.directory;
+    if (!folder.has_filename()) parsed->job.output.directory = folder.parent_path().string();
+  }
+  auto shared =
+      std::make_shared<const FarmDocument>(FarmDocument{std::move(parsed), std::move(written)});
+  shelf().add(digest, shared, text.size());
+  return shared;
 }
 
 std::string resolve_folder(const std::string& folder) {

@@ -17,11 +17,17 @@ namespace baton {
 /// of megabytes takes seconds. Called by any thread. Errors: parse_job_document's.
 Result<ParsedJobDocument> parse_farm_document(std::string_view text);
 
-/// A document, or why it is none. It stays at hand for as long as somebody has it.
-using SharedDocument = std::shared_ptr<const Result<ParsedJobDocument>>;
-/// What parse_farm_document() would say, as far as it is at hand; else nullptr.
-SharedDocument document_at_hand(const Digest& digest);
-/// One that somebody submits. Errors: parse_written_document's; those of the journal have none.
+/// What a text is.
+struct FarmDocument {
+  Result<ParsedJobDocument> parsed;  ///< see parse_farm_document()
+  /// expect_written(), for one that somebody submits. One of the journal may be of an earlier
+  /// build.
+  Status written;
+};
+/// It stays at hand for as long as somebody has it.
+using SharedDocument = std::shared_ptr<const FarmDocument>;
+/// nullptr: it is not at hand.
+SharedDocument document_at_hand(const Digest& text);
 SharedDocument share_document(std::string_view text);
 
 /// What a folder is, whichever name it goes by: its path without links, as far as it is there.

@@ -82,6 +82,7 @@ Status History::submitted(const Digest& document, const JobId& job, const std::s
 }
 
 Status History::status_changed(const Digest& version, JobStatus status, const std::string& reason) {
+  if (!is_open(status)) etas_.forget(version);
   // A version that has made way for another is not the end of the job.
   if (!jobs_.is_newest(version)) return {};
   const JobIdentity job = jobs_.of(version);

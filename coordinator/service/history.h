@@ -25,7 +25,7 @@ class History {
   void set_actor(std::string actor) { actor_ = std::move(actor); }
   const IdentityBook& jobs() const { return jobs_; }
   const RecentPast& past() const { return past_; }
-  EtaBook& etas() const { return etas_; }
+  const EtaBook& etas() const { return etas_; }
   /// Short, for people: the ID of the job, or the beginning of the digest where it has none.
   std::string name_of(const Digest& version) const;
 
@@ -63,7 +63,7 @@ class History {
   Journal& journal_;
   IdentityBook jobs_;
   RecentPast past_;
-  mutable EtaBook etas_;  ///< it keeps what it has found
+  EtaBook etas_;
   std::string actor_;
 };
 

@@ -62,14 +62,17 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
   const JobStatus status = former.status;
   Neighbour other{.job = job, .status = status};
   const JobSpec& theirs = former.document.job;
-  const auto shared = shared_frames(theirs, wanted.job);
   std::map<FrameIndex, BlobRef> images;
   for (const Completions::Task& task : former.tasks) {
     if (task.task.kind == TaskKind::assemble && task.outputs.size() == 1)
       images[task.task.frame()] = task.outputs.front();
   }
 
+  // One that ended before it had a frame has no place: there may be many, of many frames each.
+  if (!is_open(status) && images.empty() && locks.theirs.frames().empty()) return other;
+
   // A frame belongs to the job that wrote it as long as its file is unchanged.
+  const auto shared = shared_frames(theirs, wanted.job);
   const std::vector<std::string> picture = picture_differences(former.document, wanted);
   const FrameComparison comparison(former.document, wanted);
   std::set<std::string> differing;

@@ -73,7 +73,6 @@ class Service {
 
   // What people, and workers, do with jobs (service_jobs.cpp).
   Status receive(const PeerId& peer, const JobDocumentRequest& message);
-  Status receive(const PeerId& peer, const SubmitJob& message);
   Status receive(const PeerId& peer, const CancelJob& message);
   Status receive(const PeerId& peer, const PauseJob& message);
   Status receive(const PeerId& peer, const ResumeJob& message);
@@ -84,6 +83,12 @@ class Service {
   Status receive(const PeerId& peer, const StopCoordinator& message);
   template <class E>
   Status change_job(const PeerId& peer, const std::string& prefix);
+
+  // Whether a job is taken (service_submission.cpp).
+  Status receive(const PeerId& peer, const SubmitJob& message);
+  Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
+                                                const JobVersion& version, const JobSpec& spec,
+                                                const LockedFrames& locked);
 
   // What is asked (service_questions.cpp).
   Status receive(const PeerId& peer, const ListJobs& message);
@@ -100,9 +105,6 @@ class Service {
   bool await_outputs(const TaskDone& message);
   Result<bool> await_documents(const PeerId& peer, const Message& message,
                                NeededDocuments documents);
-  Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
-                                                const JobVersion& version, const JobSpec& spec,
-                                                const LockedFrames& locked);
 
   // Frames and their folder, while a job runs and at its end (service_frames.cpp).
   void start_inspections();

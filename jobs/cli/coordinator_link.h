@@ -25,6 +25,9 @@ struct CoordinatorLink {
 /// stand in for the first two.
 void add_coordinator_options(CLI::App& command, CoordinatorLink& link);
 
+/// Of an option that names a job.
+inline constexpr const char* kJobHelp = "job: its name, its ID, or the beginning of that";
+
 /// Asks for an answer of type A. Errors: those of RequestClient::request; internal when another
 /// type came.
 template <class A>

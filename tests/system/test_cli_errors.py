@@ -28,6 +28,17 @@ CUBE_JOB = {
 }
 
 
+def names_steer_no_terminal(programs, folder):
+    """What is printed of names, on either stream, is legible; what is written has the name that was meant."""
+    folder.mkdir(parents=True)
+    frame = folder / "\x1b[31mred\u202egpj.exr"
+    write_exr(frame, 2, [array("f", [1] * 6)] * 2)
+    for words, expect, stream in ((["view", frame], OK, "stdout"), (["view", str(frame) + ".none"], IO, "stderr")):
+        told = getattr(programs.run("baton", *words, expect=expect), stream)
+        check("\\x1b[31mred\\u202egpj" in told and "\x1b" not in told and "\u202e" not in told, repr(told))
+    check(frame.with_suffix(".png").exists(), "the picture")
+
+
 def grey_map(path, width, height):
     write_hdr(path, width, [bytes([128, 128, 128, 129]) * width] * height)
 

@@ -75,9 +75,9 @@ std::string with_sweeps(ParsedJobDocument document, int sweeps);
 
 /// Reads no other file: what a document says stands in it.
 Result<ParsedJobDocument> parse_job_document(std::string_view text);
-/// Error (bad_input), besides: the text is not the one that `baton` writes for its job. What is
-/// kept of it is no longer than what it says.
-Result<ParsedJobDocument> parse_written_document(std::string_view text);
+/// Error (bad_input): the text of a document is not the one that `baton` writes for its job, which
+/// is no longer than what it says.
+Status expect_written(const ParsedJobDocument& document, std::string_view text);
 
 /// Checks that every asset still has the digest it had at submission. The error names each file
 /// that changed (bad_input) or cannot be read here (io, if that is all: another machine may).

@@ -172,6 +172,7 @@ Digest picture_digest(const JobSpec& job, const std::vector<AssetDigest>& assets
 
 std::vector<std::string> picture_differences(const ParsedJobDocument& a,
                                              const ParsedJobDocument& b) {
+  if (a.picture == b.picture) return {};
   const Facts left = picture_facts(a.job, a.assets), right = picture_facts(b.job, b.assets);
   std::set<std::string> differences;
   const auto compare = [&](const Facts& one, const Facts& other) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include "common/base/paths.h"
+
 namespace baton {
 namespace {
 
@@ -40,8 +42,7 @@ bool is_below(const fs::path& path, const std::vector<fs::path>& folders) {
   if (std::distance(path.begin(), path.end()) > kMaxParts) return false;
   const fs::path found = resolve(path);
   return !found.empty() && std::ranges::any_of(folders, [&](const fs::path& folder) {
-    return std::mismatch(folder.begin(), folder.end(), found.begin(), found.end()).first ==
-           folder.end();
+    return lies_in(found, folder);
   });
 }
 

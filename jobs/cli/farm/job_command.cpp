@@ -298,8 +298,7 @@ void add_job_command(CLI::App& app, ExitCode& code) {
     if (argument == std::string("JOB")) {
       add_job_argument(*command, options->wanted);
     } else if (!std::string(argument).empty()) {
-      command->add_option(argument, options->job, "job: its name, its ID, or the beginning of that")
-          ->required();
+      command->add_option(argument, options->job, kJobHelp)->required();
     }
     add_coordinator_options(*command, options->link);
     command->add_flag("--json", options->json, "for machines");
@@ -339,7 +338,7 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   const auto [removes, removal] =
       add("delete", "Forgets a job that has ended, and removes the states that it left", "",
           delete_jobs);
-  removes->add_option("ID", removal->job, "job: its name, its ID, or the beginning of that");
+  removes->add_option("ID", removal->job, kJobHelp);
   removes->add_flag("--ended", removal->all_ended, "every job that has ended");
   const auto [waits, patience] = add(
       "wait",

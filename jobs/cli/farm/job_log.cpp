@@ -94,8 +94,7 @@ void add_job_log(CLI::App& job, ExitCode& code) {
   auto options = std::make_shared<LogOptions>();
   CLI::App* log = job.add_subcommand(
       "log", "What happened to a job, and what its workers said of it, in the order of time");
-  log->add_option("ID", options->job, "job: its name, its ID, or the beginning of that")
-      ->required();
+  log->add_option("ID", options->job, kJobHelp)->required();
   log->add_flag("-f,--follow", options->follow, "goes on with what comes");
   log->add_option("--last", options->count, "at most so many lines, the newest")
       ->check(CLI::Range(1, 1000000))

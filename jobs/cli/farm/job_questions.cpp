@@ -146,8 +146,6 @@ Result<ExitCode> set(const SetOptions& options) {
   return ExitCode::ok;
 }
 
-constexpr const char* kJobHelp = "job: its name, its ID, or the beginning of that";
-
 }  // namespace
 
 void add_job_questions(CLI::App& job, ExitCode& code) {

@@ -18,7 +18,9 @@ JobSpec job_with(const std::string& more) {
 // Settings may change without another picture; everything else is named.
 TEST(Picture, NamesWhatDecidesPixelsAlone) {
   const auto document = [](const std::string& keys) {
-    return ParsedJobDocument{.job = job_with(keys), .assets = {}, .digest = {}, .picture = {}};
+    const JobSpec job = job_with(keys);
+    return ParsedJobDocument{
+        .job = job, .assets = {}, .digest = {}, .picture = picture_digest(job, {})};
   };
   const ParsedJobDocument plain = document("");
   for (const char* setting :

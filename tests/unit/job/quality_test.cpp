@@ -106,6 +106,8 @@ TEST(Quality, RoundsAndPrerollChangeThePicture) {
     a.job.name = "a";
     ParsedJobDocument b = a;
     change(b.job);
+    a.picture = picture_digest(a.job, a.assets);
+    b.picture = picture_digest(b.job, b.assets);
     return picture_differences(a, b);
   };
   EXPECT_EQ(differences([](JobSpec& job) { job.state.preroll = 1; }),

@@ -124,49 +124,81 @@ TEST(SilentConnections, OfOneAddressOnlySoManyStay) {
   for (const int descriptor : mute) ::close(descriptor);
 }
 
-/// Of so many bytes each; 4096 of the smaller ones, which is how many may wait, are too much.
-class UnreadAnswers : public testing::TestWithParam<std::size_t> {};
-
-// Answers that nobody reads take no more memory than one of the largest.
-TEST_P(UnreadAnswers, AreLimitedInBytes) {
-  Router router = Router::bind("tcp://127.0.0.1:*").value();
+/// A client that asks and reads no answers.
+struct Talker {
+  int descriptor = -1;
+  /// As the router knows it; empty: its question has not come.
+  PeerId peer;
+};
+Talker ask_without_reading(Router& router) {
   const std::string& endpoint = router.endpoint();
-  const int talker = connect_to_loopback(std::stoi(endpoint.substr(endpoint.rfind(':') + 1)));
-  ASSERT_GE(talker, 0);
-  const auto deadline = std::chrono::steady_clock::now() + with_patience(30s);
+  Talker talker{connect_to_loopback(std::stoi(endpoint.substr(endpoint.rfind(':') + 1))), {}};
+  EXPECT_GE(talker.descriptor, 0);
   const auto say = [&](const std::string& words) {
-    EXPECT_EQ(::send(talker, words.data(), words.size(), MSG_NOSIGNAL),
+    EXPECT_EQ(::send(talker.descriptor, words.data(), words.size(), MSG_NOSIGNAL),
               static_cast<ssize_t>(words.size()));
   };
   // The library takes what comes after a greeting once it has answered that.
   say(greeting());
   std::string heard;
-  for (char byte = 0; !heard.ends_with("READY") && ::recv(talker, &byte, 1, 0) == 1;) heard += byte;
+  for (char byte = 0; !heard.ends_with("READY") && ::recv(talker.descriptor, &byte, 1, 0) == 1;)
+    heard += byte;
   say(ready() + std::string("\0\1x", 3));
   std::optional<Incoming> question;
+  const auto deadline = std::chrono::steady_clock::now() + with_patience(30s);
   while (!question && std::chrono::steady_clock::now() < deadline) question = router.receive(20ms);
-  ASSERT_TRUE(question.has_value());
-  const std::size_t answer_bytes = GetParam();
+  EXPECT_TRUE(question.has_value());
+  if (question) talker.peer = question->peer;
+  return talker;
+}
+
+/// Bytes of answers of this size that are taken for the talker, of more than may be.
+std::size_t bytes_taken(Router& router, const Talker& talker, std::size_t answer_bytes) {
   const JobDocument answer{{}, std::string(answer_bytes, 'x'), {}, {}};
   std::size_t num_taken = 0;
   for (std::size_t i = 0; i < 2 * limits::kMaxUnreadBytes / answer_bytes; ++i)
-    num_taken += router.send(question->peer, answer);
-  EXPECT_GE(num_taken, 2u);
-  EXPECT_LE(num_taken * answer_bytes, limits::kMaxUnreadBytes);
+    num_taken += router.send(talker.peer, answer);
+  return num_taken * answer_bytes;
+}
+
+// Answers that nobody reads take no more memory than one of the largest.
+TEST(UnreadAnswers, AreLimitedInBytes) {
+  Router router = Router::bind("tcp://127.0.0.1:*").value();
+  const Talker talker = ask_without_reading(router);
+  constexpr std::size_t kAnswerBytes = 4 << 20;
+  const std::size_t taken = bytes_taken(router, talker, kAnswerBytes);
+  EXPECT_GE(taken, 2 * kAnswerBytes);
+  EXPECT_LE(taken, limits::kMaxUnreadBytes);
 
   // Once it reads it gets answers again.
   std::string read(1 << 20, '\0');
   bool is_heard = false;
+  const auto deadline = std::chrono::steady_clock::now() + with_patience(30s);
   while (!is_heard && std::chrono::steady_clock::now() < deadline) {
-    while (::recv(talker, read.data(), read.size(), MSG_DONTWAIT) > 0) continue;
+    while (::recv(talker.descriptor, read.data(), read.size(), MSG_DONTWAIT) > 0) continue;
     router.receive(5ms);
-    is_heard = router.send(question->peer, answer);
+    is_heard = router.send(talker.peer, JobDocument{{}, std::string(kAnswerBytes, 'x'), {}, {}});
   }
   EXPECT_TRUE(is_heard);
-  ::close(talker);
+  ::close(talker.descriptor);
 }
 
-INSTANTIATE_TEST_SUITE_P(Bytes, UnreadAnswers, testing::Values(20u << 10, 4u << 20));
+// Small ones are limited by how many may wait for one client, so it takes several.
+TEST(UnreadAnswers, OfAllClientsAreLimitedHoweverSmall) {
+  Router router = Router::bind("tcp://127.0.0.1:*").value();
+  constexpr std::size_t kAnswerBytes = 12 << 10;
+  constexpr std::size_t kOfOne = kAnswerBytes * limits::kMaxQueuedMessages;
+  static_assert(kOfOne < limits::kMaxUnreadBytes);
+  std::vector<Talker> talkers;
+  std::size_t taken = 0;
+  for (std::size_t i = 0; i < limits::kMaxUnreadBytesInAll / kOfOne + 2; ++i) {
+    talkers.push_back(ask_without_reading(router));
+    taken += bytes_taken(router, talkers.back(), kAnswerBytes);
+  }
+  EXPECT_LE(taken, limits::kMaxUnreadBytesInAll);
+  EXPECT_GE(taken, limits::kMaxUnreadBytesInAll / 2);
+  for (const Talker& talker : talkers) ::close(talker.descriptor);
+}
 
 /// With a key, as farms have it, or without.
 class ManyMessages : public testing::TestWithParam<bool> {};

@@ -175,10 +175,11 @@ Cost tiles_of(std::uint32_t seed, Trend trend) {
 constexpr int kFarms = 100;
 const Trend kFlat = [](double, std::int32_t) { return 1.0; };
 
-struct Verdict {
-  double median_error, share_that_holds;
-};
-Verdict judge(const std::function<std::vector<Told>(std::uint32_t seed)>& farm) {
+// H: of times that are told from a quarter on half are at most 15 % off, and the interval of 80 %
+// holds in 70 to 90 %; seeds 1 to 100, each a farm. With seeds up to 200 two of the six miss it: of
+// HoldsWhereThingsMove error and share are 0.151 and 0.68, of HoldsOnceWorkersHaveCome the share is
+// 0.69.
+void expect_true(const std::function<std::vector<Told>(std::uint32_t seed)>& farm) {
   std::vector<double> errors;
   std::size_t held = 0;
   for (std::uint32_t seed = 1; seed <= kFarms; ++seed) {
@@ -188,31 +189,22 @@ Verdict judge(const std::function<std::vector<Told>(std::uint32_t seed)>& farm) 
     }
   }
   std::ranges::nth_element(errors, errors.begin() + std::ssize(errors) / 2);
-  return {errors[errors.size() / 2],
-          static_cast<double>(held) / static_cast<double>(errors.size())};
-}
-
-// H: of times that are told from a quarter on half are at most 15 % off, and the interval of 80 %
-// holds in 70 to 90 %; seeds 1 to 100, each a farm. With seeds up to 200 two of the six miss it: of
-// HoldsWhereThingsMove error and share are 0.151 and 0.68, of HoldsOnceWorkersHaveCome the share is
-// 0.69.
-void expect_true(const Verdict& verdict) {
-  EXPECT_LE(verdict.median_error, 0.15);
-  EXPECT_GE(verdict.share_that_holds, 0.70);
-  EXPECT_LE(verdict.share_that_holds, 0.90);
+  EXPECT_LE(errors[errors.size() / 2], 0.15);
+  const double share = static_cast<double>(held) / static_cast<double>(errors.size());
+  EXPECT_GE(share, 0.70);
+  EXPECT_LE(share, 0.90);
 }
 
 TEST(Forecast, HoldsAtRest) {
-  const Verdict verdict = judge([](std::uint32_t seed) {
+  expect_true([](std::uint32_t seed) {
     SimulatedFarm farm(seed);
     const SimulatedJob& job = farm.add(small_job(24, 96, 12), tiles_of(seed, kFlat));
     return farm.run(job);
   });
-  expect_true(verdict);
 }
 
 TEST(Forecast, HoldsWhereThingsMove) {
-  const Verdict verdict = judge([](std::uint32_t seed) {
+  expect_true([](std::uint32_t seed) {
     SimulatedFarm farm(seed);
     // What is costly passes through the tiles one after the other.
     const Trend passing = [](double step, std::int32_t tile) {
@@ -221,48 +213,43 @@ TEST(Forecast, HoldsWhereThingsMove) {
     const SimulatedJob& job = farm.add(moving_job(24, 48, 4), tiles_of(seed, passing));
     return farm.run(job);
   });
-  expect_true(verdict);
 }
 
 TEST(Forecast, HoldsWhereTheCameraComesCloser) {
-  const Verdict verdict = judge([](std::uint32_t seed) {
+  expect_true([](std::uint32_t seed) {
     SimulatedFarm farm(seed);
     const Trend closer = [](double step, std::int32_t) { return std::pow(3, step / 48); };
     const SimulatedJob& job = farm.add(moving_job(24, 48, 4), tiles_of(seed, closer));
     return farm.run(job);
   });
-  expect_true(verdict);
 }
 
 TEST(Forecast, HoldsOnceWorkersHaveCome) {
-  const Verdict verdict = judge([](std::uint32_t seed) {
+  expect_true([](std::uint32_t seed) {
     SimulatedFarm farm(seed);
     const SimulatedJob& job = farm.add(small_job(24, 96, 12), tiles_of(seed, kFlat));
     farm.set_threads(0, 2);
     farm.set_threads(500, 8);
     return farm.run(job, 500);
   });
-  expect_true(verdict);
 }
 
 TEST(Forecast, HoldsBehindAJobOfHigherPriority) {
-  const Verdict verdict = judge([](std::uint32_t seed) {
+  expect_true([](std::uint32_t seed) {
     SimulatedFarm farm(seed);
     farm.add(small_job(16, 48, 12), tiles_of(seed + 1000, kFlat), 150);
     const SimulatedJob& job = farm.add(small_job(24, 96, 12), tiles_of(seed, kFlat));
     return farm.run(job, 200);
   });
-  expect_true(verdict);
 }
 
 TEST(Forecast, HoldsOnceAWorkerIsLost) {
-  const Verdict verdict = judge([](std::uint32_t seed) {
+  expect_true([](std::uint32_t seed) {
     SimulatedFarm farm(seed);
     const SimulatedJob& job = farm.add(small_job(24, 96, 12), tiles_of(seed, kFlat));
     farm.set_threads(100, 6);
     return farm.run(job, 100);
   });
-  expect_true(verdict);
 }
 
 TEST(Forecast, SaysNothingOfWhatIsNotKnownYet) {
