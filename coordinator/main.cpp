@@ -122,13 +122,13 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
   baton::add_page_options<CLI::Success>(app);
   if (const auto settings = baton::take_settings(baton::describe_command(app)); !settings) {
-    fmt::print(stderr, "{}\n", settings.error().message);
+    fmt::print(stderr, "{}\n", baton::legible_text(settings.error().message));
     return static_cast<int>(baton::exit_code_of(settings.error().kind));
   }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(baton::ExitCode::usage);
+    return baton::end_parsing(app, error);
   }
 
   baton::init_logging("baton-coordinator");

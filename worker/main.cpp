@@ -186,7 +186,7 @@ int main(int argc, char** argv) {
 
   baton::add_page_options<CLI::Success>(app);
   if (const auto settings = baton::take_settings(baton::describe_command(app)); !settings) {
-    fmt::print(stderr, "{}\n", settings.error().message);
+    fmt::print(stderr, "{}\n", baton::legible_text(settings.error().message));
     return static_cast<int>(baton::exit_code_of(settings.error().kind));
   }
   try {
@@ -194,7 +194,7 @@ int main(int argc, char** argv) {
     if (!replay_command->parsed() && worker.endpoint.empty())
       throw CLI::RequiredError("--coordinator");
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(baton::ExitCode::usage);
+    return baton::end_parsing(app, error);
   }
 
   baton::init_logging("baton-worker");

@@ -1,9 +1,14 @@
 #pragma once
 
+#include <algorithm>
+#include <cstdio>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "common/base/command_info.h"
+#include "common/base/exit_codes.h"
+#include "common/base/legible.h"
 
 namespace baton {
 
@@ -43,6 +48,17 @@ void add_page_options(App& app) {
         const bool is_known = std::ranges::find(known, shell) != known.end();
         return std::string(is_known ? "" : "expected bash or zsh");
       });
+}
+
+/// Prints why the words of a command line are not taken, legibly, or the help that was asked for;
+/// returns the exit code. App: CLI::App; Fault: CLI::ParseError.
+template <class App, class Fault>
+int end_parsing(const App& app, const Fault& fault) {
+  std::ostringstream help, faults;
+  const int code = app.exit(fault, help, faults);
+  print_page(help.str());
+  std::fputs(legible_text(faults.str()).c_str(), stderr);
+  return static_cast<int>(code == 0 ? ExitCode::ok : ExitCode::usage);
 }
 
 }  // namespace baton

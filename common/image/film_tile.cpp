@@ -102,6 +102,36 @@ FilmTile framed(const FilmTile& film, const PixelRect& rect) {
   return moved;
 }
 
+FilmTile blank_image(const PixelRect& rect, std::vector<std::string> channels) {
+  FilmTile image{.rect = rect, .channels = std::move(channels), .values = {}};
+  image.values.resize(image.channels.size() * image.num_pixels());
+  return image;
+}
+
+Status paste_tile(const FilmTile& tile, FilmTile& image) {
+  const PixelRect& from = tile.rect;
+  const PixelRect& to = image.rect;
+  if (from.x0 < to.x0 || from.y0 < to.y0 || from.x1 > to.x1 || from.y1 > to.y1 ||
+      from.area() <= 0) {
+    return Error{ErrorKind::bad_input, fmt::format("tile [{},{})x[{},{}) does not lie in the image",
+                                                   from.x0, from.x1, from.y0, from.y1)};
+  }
+  if (tile.channels != image.channels) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("tile at {},{} has channels {}, expected {}", from.x0, from.y0,
+                             fmt::join(tile.channels, " "), fmt::join(image.channels, " "))};
+  }
+  for (std::size_t channel = 0; channel < tile.channels.size(); ++channel) {
+    for (std::int32_t y = from.y0; y < from.y1; ++y) {
+      const float* const row = tile.plane(channel) + std::ptrdiff_t{y - from.y0} * from.width();
+      std::copy_n(
+          row, from.width(),
+          image.plane(channel) + std::ptrdiff_t{y - to.y0} * to.width() + (from.x0 - to.x0));
+    }
+  }
+  return {};
+}
+
 Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin) {
   BATON_CHECK(!tile.channels.empty() &&
               tile.values.size() == tile.channels.size() * tile.num_pixels());

@@ -34,6 +34,12 @@ FilmTile part_of(const FilmTile& film, const PixelRect& rect);
 /// The film as `rect` frames it: its pixels inside, 0 where it has none.
 FilmTile framed(const FilmTile& film, const PixelRect& rect);
 
+/// A black image.
+FilmTile blank_image(const PixelRect& rect, std::vector<std::string> channels);
+/// Copies the pixels of `tile` into `image`. Error when the channels differ or the tile leaves the
+/// image.
+Status paste_tile(const FilmTile& tile, FilmTile& image);
+
 /// Which pass made a film. Stored; values are for ever.
 enum class FilmPass : std::uint8_t { first = 0, second = 1 };
 

@@ -40,9 +40,10 @@ enum class FarmEventKind : std::uint8_t {
   priority_changed = 23,
   worker_held = 24,  ///< takes nothing new until it is released
   worker_released = 25,
+  frames_requeued = 26,  ///< somebody wants them rendered once more
 };
-constexpr FarmEventKind last_of(FarmEventKind) { return FarmEventKind::worker_released; }
-/// "coordinator started" ... "worker released".
+constexpr FarmEventKind last_of(FarmEventKind) { return FarmEventKind::frames_requeued; }
+/// "coordinator started" ... "frames requeued".
 std::string_view farm_event_name(FarmEventKind kind);
 
 /// A task as people see it: which frames, which tile.

@@ -27,14 +27,15 @@ constexpr std::uint64_t kMaxBodyBytes =
         ? limits::kMaxWorkerMessageBytes
         : limits::kMaxMessageBytes;
 
-/// Nothing of these is shown: documents, whose bytes their digests are of, and a path that is
-/// opened.
+/// Nothing of these is made legible: documents, whose bytes their digests are of, and paths that
+/// are opened.
 template <class T>
-constexpr bool kIsVerbatim = kIsOneOf<T, SubmitJob, JobDocument, WorkerWelcome>;
+constexpr bool kIsVerbatim = kIsOneOf<T, SubmitJob, JobDocument, WorkerWelcome, PictureSource>;
 /// What these say may be several lines; any other says names.
 template <class T>
-constexpr bool kHasLines = kIsOneOf<T, TaskDone, TaskFailed, LeaseReturn, JobAccepted, JobList,
-                                    ShownJob, EventList, ReasonChain, TaskList, Refused>;
+constexpr bool kHasLines =
+    kIsOneOf<T, TaskDone, TaskFailed, LeaseReturn, JobAccepted, JobList, ShownJob, EventList,
+             ReasonChain, TaskList, RequeuePlan, Refused>;
 
 /// Makes every text of a value legible.
 class LegibleTexts {

@@ -13,6 +13,7 @@
 #include "common/job/farm_event.h"
 #include "common/job/job_id.h"
 #include "common/job/task.h"
+#include "common/math/pixel_rect.h"
 
 namespace baton {
 
@@ -21,7 +22,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 18;
+inline constexpr std::uint16_t kProtocolVersion = 19;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.
@@ -130,6 +131,8 @@ struct SubmitJob {
   /// A priority that somebody has set stays, as it is not a file that is submitted; else that of
   /// the document counts.
   bool keep_priority = false;
+  /// These frames are rendered once more, although they are there.
+  std::vector<FrameNumber> again = {};
 };
 struct ListJobs {
   bool all = false;  ///< also jobs that have ended, the newest
@@ -181,6 +184,19 @@ struct AskWhy {
   bool has_frame = false;
   FrameNumber frame{};
   std::int32_t tile = -1;  ///< of the frame; -1: the whole frame
+};
+/// What it takes to render frames of a job once more.
+struct AskRequeue {
+  std::string job;  ///< as of ShowJob
+  std::vector<FrameNumber> frames;
+};
+/// Where a frame of a job can be seen.
+struct AskPicture {
+  std::string job;  ///< as of ShowJob
+  bool has_frame = false;
+  FrameNumber frame{};  ///< else the last that is written
+  /// The finished tiles of one that is not; without a number the first such.
+  bool partial = false;
 };
 /// The tasks that workers have now, and attempts that have failed since the job was submitted last.
 /// job: as of ShowJob; empty: of all jobs that have not ended.
@@ -322,6 +338,28 @@ struct EventList {
   std::vector<ForgottenEvents> forgotten = {};  ///< of the job that was asked for
   std::string logs = {};                        ///< the folder of the workers' logs
 };
+/// What it takes to render frames once more.
+struct RequeuePlan {
+  JobIdentity identity;
+  /// Tasks that are done again, for these frames and for what is needed of earlier ones.
+  std::uint64_t num_tasks = 0;
+  double cpu_seconds = 0;  ///< about; 0: not known
+  std::string plan = {};   ///< lines
+};
+struct PictureSource {
+  JobIdentity identity = {};
+  FrameNumber frame{};
+  bool is_written = false;
+  std::string file = {};  ///< of a frame that is written
+  /// Of the image: what viewers show, and what is rendered.
+  PixelRect shown = {}, rendered = {};
+  // Of one that is not:
+  std::string store_directory = {};
+  std::int32_t num_tiles = 0;
+  std::vector<BlobRef> films = {};  ///< of the tiles that are finished
+  /// What the picture lacks beside others: ", sweep 1 of 3", ", without its plate".
+  std::string note = {};
+};
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind
   std::string message;
@@ -335,7 +373,7 @@ using Message =
                  JobAccepted, JobList, ShownJob, Refused, PauseJob, ResumeJob, OrderWorker, Drain,
                  ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates, BlobsLeft,
                  ListEvents, EventList, LockFrames, SetPriority, AskWhy, ReasonChain, ListTasks,
-                 TaskList>;
+                 TaskList, AskRequeue, RequeuePlan, AskPicture, PictureSource>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

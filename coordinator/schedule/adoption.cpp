@@ -158,7 +158,7 @@ class Predecessor {
         former_(former),
         old_(former.document.job),
         old_graph_(old_),
-        common_end_(comparison.num_common_steps()) {}
+        common_end_(comparison.num_common_steps(end_of_tasks())) {}
 
   /// How far its work reaches that the wanted job can use.
   Reach reach(FrameIndex first_open, const KeptFiles& files) {
@@ -228,6 +228,19 @@ class Predecessor {
   }
 
  private:
+  /// The one after the last step of its tasks.
+  Step end_of_tasks() const {
+    Step end{0};
+    for (const Completions::Task& task : former_.tasks) {
+      if (!old_graph_.find(task.task)) continue;
+      const Step last = task.task.kind == TaskKind::assemble
+                            ? old_graph_.timeline().last_step_of(task.task.frame())
+                            : old_graph_.steps(task.task).last;
+      end = std::max(end, last + 1);
+    }
+    return end;
+  }
+
   /// The end of the last step in common that one of its tasks has rendered.
   Step progress() const {
     Step end{0};
@@ -266,7 +279,7 @@ class Predecessor {
   const FormerJob& former_;
   const JobSpec& old_;
   const JobGraph old_graph_;
-  /// The one after the last that both jobs have.
+  /// The one after the last that both jobs have and that it has tasks of.
   const Step common_end_;
   std::vector<BlobRef> states_;
 };

@@ -117,10 +117,16 @@ struct JobPaused {
   Digest job;
   std::string waits = {};
 };
-/// lost: done tasks whose outputs are gone.
 struct JobResumed {
   Digest job;
-  std::vector<TaskKey> lost = {};
+};
+/// Done tasks of an open job are done again, whether it runs or not.
+struct TasksReopened {
+  Digest job;
+  std::vector<TaskKey> tasks;
+  std::string why = "something of them is gone";  ///< for people
+  /// So are those that are leased, and what is leased of what is made of them: nobody's failure.
+  bool stops_leases = false;
 };
 /// The files of a job's finished frames were compared with what was recorded of them. Without lost
 /// frames it is all frames of the job.
@@ -225,11 +231,12 @@ struct StoreKeeps {
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
-                           FramesInspected, FramesLocked, JobForgotten, PriorityChanged,
-                           WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
-                           AttemptFailed, ResultMissing, SpaceLacking, InputsLost, LeaseReturned,
-                           PlaceTaken, HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
+using Event =
+    std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, TasksReopened,
+                 FramesInspected, FramesLocked, JobForgotten, PriorityChanged, WorkerJoined,
+                 WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed,
+                 ResultMissing, SpaceLacking, InputsLost, LeaseReturned, PlaceTaken, HeldPublished,
+                 AttemptLeft, StoreKeeps, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed
@@ -251,7 +258,7 @@ struct RecordOutputs {
 struct RecordReopened {
   Digest job;
   std::vector<TaskKey> tasks;
-  std::string gone = "something of them";  ///< what is gone, for people
+  std::string why = "something of them is gone";  ///< for people
 };
 struct RecordJobStatus {
   Digest job;

@@ -53,6 +53,22 @@ std::vector<Digest> Scheduler::in_turn() const {
   return result;
 }
 
+std::size_t num_ready(const Scheduler& scheduler) {
+  std::size_t count = 0;
+  for (const Digest& job : scheduler.in_turn())
+    count += scheduler.find_job(job)->tasks.book().ready().size();
+  return count;
+}
+
+double longest_task_seconds(const Scheduler& scheduler) {
+  double longest = 0;
+  for (const Digest& job : scheduler.in_turn()) {
+    const auto render = static_cast<std::size_t>(TaskKind::render);
+    longest = std::max(longest, scheduler.find_job(job)->longest_seconds.at(render));
+  }
+  return longest;
+}
+
 TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt) {
   return place_of(job.spec, job.tasks.graph().timeline(), task, attempt);
 }
@@ -126,9 +142,30 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   job->tasks.attempts().forget_losses();
   job->standings.forget_blind();
   job->waits.clear();
-  reopen({event.job, event.lost}, *job, actions);
   actions.push_back(RecordJobStatus{event.job, job->status, "resumed"});
   end_if_finished(event.job, *job, actions);
+}
+
+void Scheduler::on(const TasksReopened& event, TimePoint, Actions& actions) {
+  Job* job = find(event.job);
+  if (!job || !is_open(job->status)) return;
+  const JobGraph& graph = job->tasks.graph();
+  const TaskBook& book = job->tasks.book();
+  std::set<TaskIndex> named;
+  RecordReopened done{event.job, {}, event.why};
+  for (const TaskKey& key : event.tasks) {
+    const std::optional<TaskIndex> task = graph.find(key);
+    if (task) named.insert(*task);
+    if (task && book.status(*task) != TaskStatus::leased) done.tasks.push_back(key);
+  }
+  reopen(std::move(done), *job, actions);
+  for (const TaskIndex task : leases_.of_job(event.job)) {
+    const bool is_stale = named.contains(task) || !book.has_inputs(task);
+    if (!event.stops_leases || !is_stale) continue;
+    const Lease lease = leases_.at({event.job, task});
+    actions.push_back(RevokeLease{lease.worker, lease.id});
+    return_lease({job, task}, lease.id, event.why, actions);
+  }
 }
 
 void Scheduler::on(const FramesInspected& event, TimePoint, Actions& actions) {
@@ -327,7 +364,7 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   if (!is_open(claim.job->status)) return;
   RecordReopened record{event.lease.job, makers};
   if (std::ranges::any_of(event.inputs, &BlobRef::is_held))
-    record.gone = fmt::format("what worker {} held", event.worker);
+    record.why = fmt::format("what worker {} held is gone", event.worker);
   reopen(std::move(record), *claim.job, actions);
 }
 
@@ -371,7 +408,7 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
     needed.tasks.push_back(job.tasks.graph().key(task));
   if (!needed.tasks.empty()) actions.push_back(std::move(needed));
   reopen({event.job, event.lost}, job, actions);
-  reopen({event.job, held_by_strangers(job.tasks), "what workers held"}, job, actions);
+  reopen({event.job, held_by_strangers(job.tasks), "what workers held is gone"}, job, actions);
   for (const Failure& failure : event.failures) {
     const auto task = job.tasks.graph().find(failure.lease.task);
     if (!task) continue;

@@ -118,10 +118,6 @@ class Scheduler {
   std::uint64_t store_bytes() const { return blobs_.size_bytes() + kept_bytes_; }
   /// Who is connected and has which lease.
   const LeaseBook& leases() const { return leases_; }
-  /// Tasks of running jobs that are ready.
-  std::size_t num_ready() const;
-  /// CPU time of the longest render tasks of running jobs, of late; 0: not known.
-  double longest_task_seconds() const;
   bool is_referenced(const Digest& blob) const { return blobs_.contains(blob); }
 
  private:
@@ -137,6 +133,7 @@ class Scheduler {
   void on(const JobSuperseded& event, TimePoint now, Actions& actions);
   void on(const JobPaused& event, TimePoint now, Actions& actions);
   void on(const JobResumed& event, TimePoint now, Actions& actions);
+  void on(const TasksReopened& event, TimePoint now, Actions& actions);
   void on(const FramesInspected& event, TimePoint now, Actions& actions);
   void on(const FramesLocked& event, TimePoint now, Actions& actions);
   void on(const JobForgotten& event, TimePoint now, Actions& actions);
@@ -203,6 +200,10 @@ class Scheduler {
   std::uint64_t kept_bytes_ = 0;  ///< what ended jobs leave
 };
 
+/// Tasks of running jobs that are ready.
+std::size_t num_ready(const Scheduler& scheduler);
+/// CPU time of the longest render tasks of running jobs, of late; 0: not known.
+double longest_task_seconds(const Scheduler& scheduler);
 /// A task of a job as people see it.
 TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt = 0);
 /// What decides the bytes of the job's tasks: the renderer of what is done or, where nothing is, of

@@ -79,21 +79,6 @@ void Scheduler::on(const ClockTicked&, TimePoint now, Actions& actions) {
   }
 }
 
-std::size_t Scheduler::num_ready() const {
-  std::size_t count = 0;
-  for (const auto& [rank, job] : running_) count += jobs_.at(job).tasks.book().ready().size();
-  return count;
-}
-
-double Scheduler::longest_task_seconds() const {
-  double longest = 0;
-  for (const auto& [rank, job] : running_) {
-    const auto render = static_cast<std::size_t>(TaskKind::render);
-    longest = std::max(longest, jobs_.at(job).longest_seconds.at(render));
-  }
-  return longest;
-}
-
 // ---- leases -------------------------------------------------------------------------------------
 
 /// The task of a lease that the worker says it has. A lease that was lost, or granted by an earlier
@@ -217,7 +202,8 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
 void Scheduler::lose_held(const std::string& worker, Actions& actions) {
   for (auto& [digest, job] : jobs_) {
     if (is_open(job.status))
-      reopen({digest, held_by(job.tasks, worker), "what worker " + worker + " held"}, job, actions);
+      reopen({digest, held_by(job.tasks, worker), "what worker " + worker + " held is gone"}, job,
+             actions);
   }
 }
 

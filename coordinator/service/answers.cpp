@@ -189,8 +189,8 @@ Reason Answers::end_reason(const Digest& version, JobStatus status) const {
 
 JobList Answers::list_workers() const {
   JobList list;
-  list.tasks_ready = farm_.scheduler.num_ready();
-  list.task_seconds = farm_.scheduler.longest_task_seconds();
+  list.tasks_ready = num_ready(farm_.scheduler);
+  list.task_seconds = longest_task_seconds(farm_.scheduler);
   for (WorkerSummary& worker : farm_.peers.summaries())
     list.workers.push_back(describe(std::move(worker)));
   list.turned_away = farm_.peers.turned_away().asked_within(kAbsentFor, now_);

@@ -1,7 +1,6 @@
 #include "coordinator/service/eta_book.h"
 
 #include <algorithm>
-#include <vector>
 
 namespace baton {
 namespace {
@@ -15,16 +14,40 @@ double seconds_of(TimePoint::duration time) { return std::chrono::duration<doubl
 }  // namespace
 
 void EtaBook::add(const Scheduler::Job& job, const TellLeaseEnd& end, TimePoint now) {
-  if (end.end != LeaseEnd::done) return;
-  const TaskKey& key = end.lease.task;
+  if (end.end == LeaseEnd::done)
+    note(end.lease.job, job.tasks.graph(), end.lease.task, end.worker,
+         seconds_of(now - end.granted_at));
+}
+
+void EtaBook::take_up(const Digest& version, const Scheduler::Job& job,
+                      const std::vector<FarmEvent>& done) {
+  // Places do not say which sweep they are of.
+  if (job.spec.quality.sweeps > 1) return;
   const JobGraph& graph = job.tasks.graph();
-  const bool is_workers_first = begun_.emplace(end.lease.job, end.worker).second;
-  const bool is_render = key.kind == TaskKind::render;
-  times_[end.lease.job].add({.kind = key.kind,
-                             .tile = key.kind == TaskKind::assemble ? 0 : key.tile,
-                             .steps = steps_of(graph, key),
-                             .seconds = seconds_of(now - end.granted_at),
-                             .is_first = is_workers_first || (is_render && key.run() == Run(0))});
+  std::map<FrameNumber, FrameIndex> frames;
+  for (FrameIndex frame; frame.index() < job.spec.frames.size(); ++frame)
+    frames[job.spec.frames[frame.index()]] = frame;
+  for (const FarmEvent& event : done) {
+    const auto first = frames.find(event.task.first);
+    if (!event.has_task || first == frames.end()) continue;
+    const Step step = graph.timeline().step_of(first->second, Sweep(0));
+    TaskKey task = assemble_task(first->second);
+    if (event.task.kind == TaskKind::second_pass) task = second_pass_task(step, event.task.tile);
+    if (event.task.kind == TaskKind::render)
+      task = render_task(graph.timeline().run_of(step), event.task.tile);
+    if (graph.find(task)) note(version, graph, task, event.worker, event.seconds);
+  }
+}
+
+void EtaBook::note(const Digest& version, const JobGraph& graph, const TaskKey& task,
+                   const std::string& worker, double seconds) {
+  const bool is_workers_first = begun_.emplace(version, worker).second;
+  const bool is_render = task.kind == TaskKind::render;
+  times_[version].add({.kind = task.kind,
+                       .tile = task.kind == TaskKind::assemble ? 0 : task.tile,
+                       .steps = steps_of(graph, task),
+                       .seconds = seconds,
+                       .is_first = is_workers_first || (is_render && task.run() == Run(0))});
 }
 
 void EtaBook::forget(const Digest& version) {

@@ -4,20 +4,24 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/job/activity.h"
+#include "common/job/farm_event.h"
 #include "coordinator/schedule/forecast.h"
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/schedule/task_times.h"
 
 namespace baton {
 
-/// How long the tasks of open jobs take, and when the jobs will be done (forecast.h). What an
-/// earlier coordinator saw is not known.
+/// How long the tasks of open jobs take, and when the jobs will be done (forecast.h).
 class EtaBook {
  public:
   /// A lease of the job has ended.
   void add(const Scheduler::Job& job, const TellLeaseEnd& end, TimePoint now);
+  /// What an earlier coordinator has told of the job's tasks that are done, in the order of time.
+  void take_up(const Digest& version, const Scheduler::Job& job,
+               const std::vector<FarmEvent>& done);
   /// A version of a job has ended.
   void forget(const Digest& version);
 
@@ -30,6 +34,8 @@ class EtaBook {
     std::map<Digest, Eta> etas;
     TimePoint at{}, again{};
   };
+  void note(const Digest& version, const JobGraph& graph, const TaskKey& task,
+            const std::string& worker, double seconds);
   Found find(const Scheduler& scheduler, int num_slots, TimePoint now) const;
 
   std::map<Digest, TaskTimes> times_;

@@ -122,12 +122,16 @@ Result<std::optional<JobDetail>> FarmCore::archived_detail(const Digest& job) {
 }
 
 Result<bool> FarmCore::ended_by_frames(const Digest& job, const std::string& reason,
-                                       bool done_counts) {
+                                       const std::vector<FrameNumber>* unlocked) {
   BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
   if (!detail) return false;
   JobSummary& summary = detail->summary;
   const bool has_failed = summary.status == JobStatus::failed && summary.tasks_failed == 0;
   const bool was_done = summary.status == JobStatus::done;
+  const std::set<FrameNumber> has(detail->frames_done.begin(), detail->frames_done.end());
+  const bool done_counts =
+      unlocked != nullptr &&
+      std::ranges::all_of(*unlocked, [&](FrameNumber frame) { return has.contains(frame); });
   if (!has_failed && !(was_done && done_counts)) return false;
   if (reason.empty()) return true;
   if (was_done) {
@@ -188,8 +192,7 @@ Status FarmCore::perform(const RecordFailure& action) {
 }
 
 Status FarmCore::perform(const RecordReopened& action) {
-  spdlog::warn("job {}: {} finished tasks are done again, since {} is gone",
-               history.name_of(action.job), action.tasks.size(), action.gone);
+  spdlog::warn("job {}: {}", history.name_of(action.job), reopened_text(action));
   BATON_TRY(history.reopened(action));
   return journal.record_reopened(action.job, action.tasks);
 }

@@ -131,9 +131,11 @@ class FarmCore {
   Result<JobDetail> living_detail(const Digest& job);
   /// Describes a job of the archive; nullopt: it is not there.
   Result<std::optional<JobDetail>> archived_detail(const Digest& job);
-  /// Whether a job has failed for its frames alone, or was done where that counts. One that is has
-  /// failed for this reason from now on; empty: it stays as it is.
-  Result<bool> ended_by_frames(const Digest& job, const std::string& reason, bool done_counts);
+  /// Whether a job has failed for its frames alone, or was done and still has those that are
+  /// `unlocked` (null: one that was done does not count). One that is has failed for this reason
+  /// from now on; empty: it stays as it is.
+  Result<bool> ended_by_frames(const Digest& job, const std::string& reason,
+                               const std::vector<FrameNumber>* unlocked);
 
  private:
   // Actions of the scheduler.

@@ -67,10 +67,16 @@ SharedDocument share_document(std::string_view text) {
     const fs::path folder = parsed->job.output.directory;
     if (!folder.has_filename()) parsed->job.output.directory = folder.parent_path().string();
   }
-  auto shared =
-      std::make_shared<const FarmDocument>(FarmDocument{std::move(parsed), std::move(written)});
+  auto shared = std::make_shared<const FarmDocument>(
+      FarmDocument{std::move(parsed), std::move(written), text.size()});
   shelf().add(digest, shared, text.size());
   return shared;
+}
+
+Result<SharedDocument> journalled_document(Journal& journal, const Digest& job) {
+  if (SharedDocument known = document_at_hand(job)) return known;
+  BATON_ASSIGN(const std::optional<std::string> text, journal.document(job));
+  return share_document(text.value_or(""));
 }
 
 std::string resolve_folder(const std::string& folder) {
@@ -96,20 +102,21 @@ Result<NeededDocuments> documents_in_folder(Journal& journal, const std::string&
   NeededDocuments needed;
   std::size_t bytes = 0;
   for (const Digest& job : jobs) {
-    BATON_ASSIGN(std::optional<std::string> text, journal.document(job));
-    if (!text) continue;
-    bytes += text->size();
+    if (SharedDocument known = document_at_hand(job)) {
+      bytes += known->size_bytes;
+      needed.at_hand.push_back(std::move(known));
+    } else {
+      BATON_ASSIGN(std::optional<std::string> text, journal.document(job));
+      if (!text) continue;
+      bytes += text->size();
+      needed.texts.push_back(std::move(*text));
+    }
     if (bytes > kMaxDocumentBytes)
       return Error{ErrorKind::bad_input,
                    fmt::format("{}: jobs that write or wrote here have documents of more than {} "
                                "MiB in all: delete some (baton job delete), or choose another "
                                "output.directory",
                                folder, kMaxDocumentBytes >> 20)};
-    if (SharedDocument known = document_at_hand(job)) {
-      needed.at_hand.push_back(std::move(known));
-    } else {
-      needed.texts.push_back(std::move(*text));
-    }
   }
   return needed;
 }

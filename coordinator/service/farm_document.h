@@ -23,12 +23,15 @@ struct FarmDocument {
   /// expect_written(), for one that somebody submits. One of the journal may be of an earlier
   /// build.
   Status written;
+  std::size_t size_bytes = 0;
 };
 /// It stays at hand for as long as somebody has it.
 using SharedDocument = std::shared_ptr<const FarmDocument>;
 /// nullptr: it is not at hand.
 SharedDocument document_at_hand(const Digest& text);
 SharedDocument share_document(std::string_view text);
+/// Of a job of the journal; of one that is not known, one that cannot be parsed.
+Result<SharedDocument> journalled_document(Journal& journal, const Digest& job);
 
 /// What a folder is, whichever name it goes by: its path without links, as far as it is there.
 std::string resolve_folder(const std::string& folder);

@@ -1,6 +1,7 @@
 #include "coordinator/service/file_reader.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <utility>
@@ -56,6 +57,8 @@ void FileReader::run() {
     } else if (!request.documents.empty()) {
       request.read.documents.push_back(share_document(request.documents.front()));
       request.documents.pop_front();
+      // Parsing takes sixty times the text for a moment, which the allocator would keep.
+      ::malloc_trim(0);
     }
     lock.lock();
 

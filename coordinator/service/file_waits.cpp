@@ -50,11 +50,12 @@ FileWaits::Parsing FileWaits::parse(const Incoming& message, NeededDocuments doc
   return Parsing::waits;
 }
 
-std::vector<Incoming> FileWaits::take_ready(FileTable& table) {
+std::vector<Incoming> FileWaits::take_ready(FileTable& table, TimePoint now) {
   std::vector<Incoming> ready;
-  parsed_.clear();
-  std::vector<FilesRead> done = reader_.take();
-  std::ranges::move(parser_.take(), std::back_inserter(done));
+  std::vector<FilesRead> done = reader_.take(), parsed = parser_.take();
+  if (!parsed.empty() || now - parsed_at_ > kKeepParsed) parsed_.clear();
+  if (!parsed.empty()) parsed_at_ = now;
+  std::ranges::move(parsed, std::back_inserter(done));
   for (FilesRead& read : done) {
     std::ranges::move(read.documents, std::back_inserter(parsed_));
     for (const FileContent& content : read.contents) table.add(content);

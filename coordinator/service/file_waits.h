@@ -22,6 +22,9 @@ class FileWaits {
 
   /// Of documents that are parsed at once.
   static constexpr std::size_t kParsedAtOnceBytes = 64u << 10;
+  /// What was parsed last stays at hand so long: who was told to wait asks again, and may wait for
+  /// frames then.
+  static constexpr std::chrono::seconds kKeepParsed{5};
 
   FileWaits(Disk disk, const std::function<void()>& wake)
       : reader_(std::move(disk), wake), parser_({}, wake) {}
@@ -42,7 +45,7 @@ class FileWaits {
   }
 
   /// The messages that need not wait any more, once `table` has what was read for them.
-  std::vector<Incoming> take_ready(FileTable& table);
+  std::vector<Incoming> take_ready(FileTable& table, TimePoint now);
   /// The inspections among what take_ready() found; each once.
   std::vector<FilesRead> take_inspected() { return std::exchange(inspected_, {}); }
   /// Clients that are to be answered that their message waits; it is forgotten, but files are read.
@@ -66,7 +69,8 @@ class FileWaits {
   };
   std::map<ReadFor, Wait> waits_;
   std::vector<FilesRead> inspected_;
-  std::vector<SharedDocument> parsed_;  ///< for the messages that are handled now
+  std::vector<SharedDocument> parsed_;  ///< of one message
+  TimePoint parsed_at_{};
   /// Documents do not hold up frames.
   FileReader reader_, parser_;
 };

@@ -29,33 +29,35 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
   for (const auto& [file, picture] : given_up) record.given_up_[fs::path(folder) / file] = picture;
   BATON_ASSIGN(const std::vector<Digest> neighbours, jobs_in_folder(journal, folder));
   for (const Digest& other : neighbours) {
-    BATON_ASSIGN(const std::optional<std::string> text, journal.document(other));
-    Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
-    if (!document) continue;
-    document->job.output.directory = folder;
+    BATON_ASSIGN(const SharedDocument document, journalled_document(journal, other));
+    if (!document->parsed) continue;
+    const JobSpec& spec = document->parsed->job;
+    const auto path_of = [&](FrameIndex frame) {
+      return fs::path(folder) /
+             frame_file_name(spec.output.pattern, spec.frames[frame.index()].value());
+    };
     Writer& writer = record.jobs_[other];
     BATON_ASSIGN(writer.renderers, journal.renderers(other));
     BATON_ASSIGN(const auto granted, journal.frame_files(other));
     std::map<fs::path, std::int64_t> rendered;
     for (const auto& [frame, file] : granted) {
-      if (frame.index() >= document->job.frames.size()) continue;
-      const fs::path path = frame_path(document->job, frame);
+      if (frame.index() >= spec.frames.size()) continue;
+      const fs::path path = path_of(frame);
       if (!file.is_gone) writer.granted.insert(path);
       if (file.rendered != 0) rendered[path] = file.rendered;
     }
     // What another job had when it ended, less what it has lost since.
-    std::optional<JobDetail> ended;
+    std::optional<std::set<FrameNumber>> has;
     if (jobs.of(other).id != id) {
-      BATON_ASSIGN(ended, archived_detail(journal, other, other.short_hex()));
+      BATON_ASSIGN(const auto ended, archived_detail(journal, other, other.short_hex()));
+      if (ended) has.emplace(ended->frames_done.begin(), ended->frames_done.end());
     }
     BATON_TRY(journal.for_each_completion(other, [&](const Completion& done) -> Status {
       if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
       const FrameIndex frame = done.task.frame();
-      if (frame.index() >= document->job.frames.size()) return {};
-      const bool is_given_away =
-          ended && std::ranges::find(ended->frames_done, document->job.frames[frame.index()]) ==
-                       ended->frames_done.end();
-      const fs::path path = frame_path(document->job, frame);
+      if (frame.index() >= spec.frames.size()) return {};
+      const bool is_given_away = has && !has->contains(spec.frames[frame.index()]);
+      const fs::path path = path_of(frame);
       const auto last = rendered.extract(path);
       record.images_[path].push_back({.job = other,
                                       .image = done.made.outputs.front(),
@@ -130,7 +132,7 @@ bool FolderRecord::may_be_unreported(const fs::path& path, const FileVerdict& pi
   const auto images = images_.find(path);
   const bool is_reported =
       images != images_.end() && std::ranges::any_of(images->second, [&](const Image& image) {
-        return image.job == job && !image.is_lost;
+        return image.job == job && !image.is_lost && !image.image.is_placeholder();
       });
   const bool is_of_job = std::ranges::find(family_, job) != family_.end();
   return is_by_us && !is_reported &&

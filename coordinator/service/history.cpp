@@ -88,6 +88,8 @@ Status History::status_changed(const Digest& version, JobStatus status, const st
   const JobIdentity job = jobs_.of(version);
   JobTimes times = job.times;
   times.ended_ms = is_open(status) ? 0 : now_ms();
+  // Nothing had to be rendered.
+  if (status == JobStatus::done && times.started_ms == 0) times.started_ms = times.ended_ms;
   BATON_TRY(jobs_.set_times(journal_, job.id, times));
   const double seconds = times.ended_ms == 0 || times.started_ms == 0
                              ? 0
@@ -108,6 +110,12 @@ Status History::locked(const Digest& version, const std::vector<FrameNumber>& fr
   return tell({.kind = is_locked ? FarmEventKind::frames_locked : FarmEventKind::frames_unlocked,
                .job = job,
                .reason = "frames " + format_frames(frames) + why});
+}
+
+Status History::requeued(const Digest& version, const std::vector<FrameNumber>& frames) {
+  return tell({.kind = FarmEventKind::frames_requeued,
+               .job = jobs_.of(version).id,
+               .reason = "frames " + format_frames(frames)});
 }
 
 Status History::prioritized(const Digest& version, std::int32_t before,
@@ -149,11 +157,25 @@ Status History::lease_ended(const Scheduler::Job* job, const TellLeaseEnd& end) 
   return tell(std::move(event));
 }
 
+Status History::take_up_times(const Digest& version, const Scheduler::Job& job) {
+  BATON_ASSIGN(const std::vector<FarmEvent> done,
+               journal_.events({.job = jobs_.of(version).id,
+                                .count = limits::kMaxEventsTold,
+                                .kinds = bit_of(FarmEventKind::task_done)}));
+  etas_.take_up(version, job, done);
+  return {};
+}
+
+std::string reopened_text(const RecordReopened& tasks) {
+  const bool is_one = tasks.tasks.size() == 1;
+  return fmt::format("{} finished {} done again, since {}", tasks.tasks.size(),
+                     is_one ? "task is" : "tasks are", tasks.why);
+}
+
 Status History::reopened(const RecordReopened& tasks) {
   return tell({.kind = FarmEventKind::tasks_reopened,
                .job = jobs_.of(tasks.job).id,
-               .reason = fmt::format("{} finished tasks are done again, since {} is gone",
-                                     tasks.tasks.size(), tasks.gone)});
+               .reason = reopened_text(tasks)});
 }
 
 Status History::happened(FarmEventKind kind, const std::string& worker, const std::string& reason) {

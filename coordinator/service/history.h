@@ -10,6 +10,9 @@
 
 namespace baton {
 
+/// "3 finished tasks are done again, since ...".
+std::string reopened_text(const RecordReopened& tasks);
+
 /// Tells the journal what happens, once, in the transaction of what it tells. Jobs are named by the
 /// digest of a version; one that is a version of no job is told of without a name.
 class History {
@@ -38,6 +41,7 @@ class History {
   /// why: what is said of that.
   Status locked(const Digest& version, const std::vector<FrameNumber>& frames, bool is_locked,
                 std::int64_t changed_ms, const std::string& why = {});
+  Status requeued(const Digest& version, const std::vector<FrameNumber>& frames);
   /// The job has another priority from now on. before: the one it had; why: what is said of that.
   Status prioritized(const Digest& version, std::int32_t before, const PriorityChange& priority,
                      const std::string& why = {});
@@ -49,6 +53,8 @@ class History {
                  const std::string& reason = {});
   /// job: null: it is forgotten.
   Status lease_ended(const Scheduler::Job* job, const TellLeaseEnd& end);
+  /// An earlier coordinator has seen tasks of this open job.
+  Status take_up_times(const Digest& version, const Scheduler::Job& job);
   Status reopened(const RecordReopened& tasks);
   /// Of the coordinator or a worker.
   Status happened(FarmEventKind kind, const std::string& worker = {},

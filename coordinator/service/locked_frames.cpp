@@ -39,9 +39,8 @@ std::string locked_text(const JobSpec& spec, const LockedFrames& locked) {
                      is_one ? "it is" : "they are");
 }
 
-Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
-                                               const std::vector<FrameNumber>& frames,
-                                               const Scheduler::Job* job) {
+Result<std::vector<FrameIndex>> places_of(const JobSpec& spec,
+                                          const std::vector<FrameNumber>& frames) {
   std::vector<FrameIndex> places;
   std::map<FrameNumber, FrameIndex> known;
   for (FrameIndex place; place.index() < spec.frames.size(); ++place)
@@ -60,6 +59,13 @@ Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
                  fmt::format("job '{}': it has no frames {}, expected some of {}", spec.name,
                              format_frames(unknown), format_frames(spec.frames))};
   }
+  return places;
+}
+
+Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
+                                               const std::vector<FrameNumber>& frames,
+                                               const Scheduler::Job* job) {
+  BATON_ASSIGN(std::vector<FrameIndex> places, places_of(spec, frames));
   for (const FrameIndex frame : places) {
     const std::filesystem::path path = frame_path(spec, frame);
     BATON_ASSIGN(const std::optional<FileStamp> stamp, stamp_of(path));
@@ -85,8 +91,8 @@ namespace {
 Result<std::vector<JobSpec>> specs_of(Journal& journal, const std::vector<Digest>& versions) {
   std::vector<JobSpec> specs;
   for (const Digest& version : versions) {
-    BATON_ASSIGN(const std::optional<std::string> text, journal.document(version));
-    Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+    BATON_ASSIGN(const SharedDocument known, journalled_document(journal, version));
+    const Result<ParsedJobDocument>& document = known->parsed;
     if (document) specs.push_back(std::move(document->job));
   }
   return specs;

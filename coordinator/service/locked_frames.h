@@ -34,9 +34,12 @@ class LockedFrames {
 /// For people: which frames stay as they are; empty: none are locked.
 std::string locked_text(const JobSpec& spec, const LockedFrames& locked);
 
+/// The places of frames in a document. Error (bad_input): it does not have them all.
+Result<std::vector<FrameIndex>> places_of(const JobSpec& spec,
+                                          const std::vector<FrameNumber>& frames);
 /// The places of frames that are to be locked. job: of this document; null: it has ended. Errors:
-/// bad_input, the document does not have them all, or a file is not there; timeout, a worker is
-/// writing one now; those of stamp_of().
+/// places_of()'s; bad_input, a file is not there; timeout, a worker is writing one now; those of
+/// stamp_of().
 Result<std::vector<FrameIndex>> frames_to_lock(const JobSpec& spec,
                                                const std::vector<FrameNumber>& frames,
                                                const Scheduler::Job* job);

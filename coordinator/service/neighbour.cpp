@@ -13,27 +13,7 @@
 #include "common/job/text/job_json.h"
 
 namespace baton {
-namespace {
-
-/// The frames of two jobs that write the same file.
-std::vector<std::pair<FrameIndex, FrameIndex>> shared_frames(const JobSpec& a, const JobSpec& b) {
-  std::map<std::string, FrameIndex> of_b;
-  FrameIndex place{0};
-  for (const FrameNumber frame : b.frames) {
-    of_b[frame_file_name(b.output.pattern, frame.value())] = place;
-    ++place;
-  }
-  std::vector<std::pair<FrameIndex, FrameIndex>> shared;
-  place = FrameIndex(0);
-  for (const FrameNumber frame : a.frames) {
-    const auto found = of_b.find(frame_file_name(a.output.pattern, frame.value()));
-    if (found != of_b.end()) shared.emplace_back(place, found->second);
-    ++place;
-  }
-  return shared;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 std::string differing_text(const std::vector<std::string>& differing) {
   constexpr std::size_t kMost = 8;
@@ -56,32 +36,65 @@ Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec&
   return {ErrorKind::bad_input, std::move(text)};
 }
 
-Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
+FramesByFile::FramesByFile(const ParsedJobDocument& document) : document_(document) {
+  FrameIndex place{0};
+  for (const FrameNumber frame : document.job.frames) {
+    places_[frame_file_name(document.job.output.pattern, frame.value())] = place;
+    ++place;
+  }
+}
+
+std::optional<FrameIndex> FramesByFile::find(const JobSpec& other, FrameIndex frame) const {
+  const auto found =
+      places_.find(frame_file_name(other.output.pattern, other.frames[frame.index()].value()));
+  return found == places_.end() ? std::nullopt : std::optional(found->second);
+}
+
+namespace {
+
+/// The frames of a job of which something may be there: all of one that is open, else those that it
+/// has written and that are locked.
+std::set<FrameIndex> frames_with_something(const FormerJob& former,
+                                           const std::map<FrameIndex, BlobRef>& images,
+                                           const LockedFrames& locked) {
+  std::set<FrameIndex> frames = locked.frames();
+  for (const auto& [frame, image] : images) frames.insert(frame);
+  const FrameIndex end(static_cast<std::int32_t>(former.document.job.frames.size()));
+  for (FrameIndex frame; is_open(former.status) && frame < end; ++frame)
+    frames.insert(frames.end(), frame);
+  return frames;
+}
+
+}  // namespace
+
+Neighbour look_at(const FormerJob& former, const Digest& job, const FramesByFile& frames,
                   const FileTable& files, const std::vector<FrameNumber>* owned,
                   const Locks& locks) {
   const JobStatus status = former.status;
   Neighbour other{.job = job, .status = status};
+  const ParsedJobDocument& wanted = frames.document();
   const JobSpec& theirs = former.document.job;
   std::map<FrameIndex, BlobRef> images;
   for (const Completions::Task& task : former.tasks) {
     if (task.task.kind == TaskKind::assemble && task.outputs.size() == 1)
       images[task.task.frame()] = task.outputs.front();
   }
-
-  // One that ended before it had a frame has no place: there may be many, of many frames each.
-  if (!is_open(status) && images.empty() && locks.theirs.frames().empty()) return other;
+  std::set<FrameNumber> still_owned;
+  if (owned != nullptr) still_owned.insert(owned->begin(), owned->end());
 
   // A frame belongs to the job that wrote it as long as its file is unchanged.
-  const auto shared = shared_frames(theirs, wanted.job);
   const std::vector<std::string> picture = picture_differences(former.document, wanted);
   const FrameComparison comparison(former.document, wanted);
   std::set<std::string> differing;
-  for (const auto& [mine, its] : shared) {
-    if (locks.theirs.contains(mine)) other.locked.push_back(theirs.frames[mine.index()]);
+  for (const FrameIndex mine : frames_with_something(former, images, locks.theirs)) {
+    const FrameNumber number = theirs.frames[mine.index()];
     const auto image = images.find(mine);
-    const bool is_owned =
-        owned == nullptr ||
-        std::find(owned->begin(), owned->end(), theirs.frames[mine.index()]) != owned->end();
+    const std::optional<FrameIndex> place = frames.find(theirs, mine);
+    if (!place && image == images.end() && is_open(status)) other.left_out.push_back(number);
+    if (!place) continue;
+    const FrameIndex its = *place;
+    if (locks.theirs.contains(mine)) other.locked.push_back(number);
+    const bool is_owned = owned == nullptr || still_owned.contains(number);
     const FileState state = is_owned && image != images.end()
                                 ? files.judge(frame_path(theirs, mine), image->second).state
                                 : FileState::absent;
@@ -101,11 +114,6 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
   }
   other.differing.assign(differing.begin(), differing.end());
   other.busy = is_open(status) && other.written.empty();
-  const std::map<FrameIndex, FrameIndex> in_both(shared.begin(), shared.end());
-  for (FrameIndex frame; frame.index() < theirs.frames.size(); ++frame) {
-    if (!in_both.contains(frame) && !images.contains(frame))
-      other.left_out.push_back(theirs.frames[frame.index()]);
-  }
   return other;
 }
 

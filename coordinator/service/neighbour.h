@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "coordinator/schedule/adoption.h"
@@ -23,7 +24,7 @@ struct Neighbour {
   bool has_place = false;
   /// It is open, and no frame says whose picture it is.
   bool busy = false;
-  /// Frames that it has not written and the new one does not have.
+  /// If it is open: frames that it has not written and the new one does not have.
   std::vector<FrameNumber> left_out = {};
   /// Frames in common that are locked in it, as a job of its own.
   std::vector<FrameNumber> locked = {};
@@ -34,9 +35,23 @@ struct Locks {
   LockedFrames theirs, mine;
 };
 
-/// What a journalled job has written, beside a new one. owned: its frames by number, without those
-/// that another one has replaced; null: all.
-Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
+/// The frames of a new job, by the names of their files.
+class FramesByFile {
+ public:
+  /// document: outlives it.
+  explicit FramesByFile(const ParsedJobDocument& document);
+  const ParsedJobDocument& document() const { return document_; }
+  /// The one that has the file of another job's frame; nullopt: none.
+  std::optional<FrameIndex> find(const JobSpec& other, FrameIndex frame) const;
+
+ private:
+  const ParsedJobDocument& document_;
+  std::unordered_map<std::string, FrameIndex> places_;
+};
+
+/// What a journalled job has written, beside a new one with these frames. owned: its frames by
+/// number, without those that another one has replaced; null: all.
+Neighbour look_at(const FormerJob& former, const Digest& job, const FramesByFile& frames,
                   const FileTable& files, const std::vector<FrameNumber>* owned,
                   const Locks& locks = {});
 

@@ -43,6 +43,8 @@ template <> inline constexpr Rights kRights<CancelJob>          {"cancel jobs", 
 template <> inline constexpr Rights kRights<LockFrames>         {"lock frames",   May::no,  May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<SetPriority>        {"set priorities", May::no, May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<AskWhy>             {"ask why",       May::no,  May::yes, May::yes, May::yes};
+template <> inline constexpr Rights kRights<AskRequeue>         {"render frames again", May::no, May::no, May::own, May::yes};
+template <> inline constexpr Rights kRights<AskPicture>         {"ask for pictures", May::no, May::yes, May::yes, May::yes};
 template <> inline constexpr Rights kRights<ListTasks>          {"list tasks",    May::no,  May::yes, May::yes, May::yes};
 template <> inline constexpr Rights kRights<DeleteJob>          {"delete jobs",   May::no,  May::no,  May::own, May::yes};
 template <> inline constexpr Rights kRights<OrderWorker>        {"drain or hold workers", May::no,  May::no,  May::no,  May::yes};

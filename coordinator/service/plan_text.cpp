@@ -51,20 +51,21 @@ std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>&
   const auto is_written = [&](FrameIndex frame) {
     return job.tasks.book().status(*graph.find(assemble_task(frame))) == TaskStatus::done;
   };
-  std::vector<FrameIndex> kept, left, again;
+  std::vector<FrameIndex> kept, left;
   for (FrameIndex frame{0}; frame < FrameIndex(graph.num_frames()); ++frame)
     (is_written(frame) ? kept : left).push_back(frame);
   const OpenRuns open = find_open_runs(job.tasks);
   const bool some_work = kept.size() + left.size() > 0 && job.tasks.book().counts().done > 0;
   if (kept.empty() && reasons.empty() && !some_work) return {};
+  std::set<FrameIndex> written_again;
   for (const Run run : open.runs) {
     const StepSpan steps = timeline.steps_of(run);
     for (Step step = steps.first; step <= steps.last; ++step) {
       const FrameIndex frame = timeline.frame_of(step);
-      if (is_written(frame) && std::find(again.begin(), again.end(), frame) == again.end())
-        again.push_back(frame);
+      if (is_written(frame)) written_again.insert(frame);
     }
   }
+  const std::vector<FrameIndex> again(written_again.begin(), written_again.end());
 
   std::string text;
   if (!kept.empty()) text += fmt::format("{} {} kept\n", frames_text(spec, kept), are(kept));

@@ -13,6 +13,7 @@
 #include "coordinator/service/evidence.h"
 #include "coordinator/service/file_room.h"
 #include "coordinator/service/permissions.h"
+#include "coordinator/service/questions.h"
 
 namespace baton {
 namespace {
@@ -27,6 +28,12 @@ constexpr std::chrono::milliseconds kTick{250};
 constexpr std::chrono::minutes kTellInterval{1};
 constexpr std::size_t kMaxTold = 100;
 constexpr std::size_t kMaxWorkerName = 256;
+
+/// For these the document of the job that they name is read.
+template <class M>
+constexpr bool kReadsDocument =
+    std::is_same_v<M, LockFrames> || std::is_same_v<M, SetPriority> ||
+    std::is_same_v<M, DeleteJob> || std::is_same_v<M, AskRequeue> || std::is_same_v<M, AskPicture>;
 
 /// bad_input: no worker can have so many in hand.
 Status check_leases(const std::vector<LeaseId>& running) {
@@ -377,7 +384,8 @@ Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
 
 /// Handles what need not wait any more; who waits on is told that it does.
 Status Service::handle_read() {
-  for (const Incoming& message : waits_->take_ready(files_)) BATON_TRY(handle(message));
+  const TimePoint now = std::chrono::steady_clock::now();
+  for (const Incoming& message : waits_->take_ready(files_, now)) BATON_TRY(handle(message));
   for (const FilesRead& read : waits_->take_inspected()) BATON_TRY(end_inspection(read));
   files_.forget_unread();
   for (const FileWaits::Notice& notice : waits_->take_notices(std::chrono::steady_clock::now()))
@@ -407,6 +415,15 @@ Result<bool> Service::await_documents(const PeerId& peer, const Message& message
   if (parsing == FileWaits::Parsing::no_place)
     BATON_TRY(farm_.refuse(peer, {ErrorKind::timeout, "other documents are being read"}));
   return parsing != FileWaits::Parsing::done;
+}
+
+/// Whether a message waits for the document of the job that it names.
+Result<bool> Service::await_document_of(const PeerId& peer, const Message& message,
+                                        const std::string& job) {
+  const Result<Digest> version = Questions(farm_).resolve(job);
+  if (!version || document_at_hand(*version) != nullptr) return false;
+  BATON_ASSIGN(std::optional<std::string> text, farm_.journal.document(*version));
+  return text ? await_documents(peer, message, {{}, {std::move(*text)}}) : Result<bool>(false);
 }
 
 /// Whether a report waits for its files; not for longer than file_patience.
@@ -441,8 +458,14 @@ Status Service::handle(const Incoming& incoming) {
       [&](const auto& message) -> Status {
         using M = std::decay_t<decltype(message)>;
         if (may_say<M>(speaker_) == May::no) return forbid<M>(peer);
+        if constexpr (kReadsDocument<M>) {
+          BATON_ASSIGN(const bool waits, await_document_of(peer, message, message.job));
+          if (waits) return {};
+        }
         if constexpr (requires { this->receive(peer, message); }) {
           return receive(peer, message);
+        } else if constexpr (requires(Questions questions) { questions.answer(peer, message); }) {
+          return Questions(farm_).answer(peer, message);
         } else if constexpr (requires { this->receive_from(worker, message); }) {
           if (!worker.empty()) return receive_from(worker, message);
           return asked_for_hello_.first(peer) ? farm_.reply(peer, HelloAgain{}) : Status();
@@ -456,7 +479,7 @@ Status Service::handle(const Incoming& incoming) {
 
 /// The job that is meant, if the speaker may change it.
 Result<Digest> Service::resolve_own(const std::string& text) {
-  BATON_ASSIGN(const Digest job, resolve(text));
+  BATON_ASSIGN(const Digest job, Questions(farm_).resolve(text));
   if (const Status own = farm_.check_own(speaker_, job); !own) {
     spdlog::warn("refused: {}", own.error().message);
     return own.error();

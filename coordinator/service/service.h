@@ -81,23 +81,18 @@ class Service {
   Status receive(const PeerId& peer, const DeleteJob& message);
   Status receive(const PeerId& peer, const OrderWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
+  Status end_as_frames_stand(const ParsedJobDocument& document, const JobVersion& version,
+                             const std::vector<FrameNumber>& locked,
+                             const std::vector<FrameNumber>* unlocked);
   template <class E>
   Status change_job(const PeerId& peer, const std::string& prefix);
 
   // Whether a job is taken (service_submission.cpp).
   Status receive(const PeerId& peer, const SubmitJob& message);
+  Status receive(const PeerId& peer, const AskRequeue& message);
   Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
                                                 const JobVersion& version, const JobSpec& spec,
                                                 const LockedFrames& locked);
-
-  // What is asked (service_questions.cpp).
-  Status receive(const PeerId& peer, const ListJobs& message);
-  Status receive(const PeerId& peer, const ShowJob& message);
-  Status receive(const PeerId& peer, const AskWhy& message);
-  Status receive(const PeerId& peer, const ListTasks& message);
-  Status receive(const PeerId& peer, const ListEvents& message);
-  Status answer_detail(const PeerId& peer, const Digest& job, std::string plan = {});
-  Result<Digest> resolve(const std::string& text);
 
   // Files that must be read before a message can be handled.
   Status handle_read();
@@ -105,6 +100,8 @@ class Service {
   bool await_outputs(const TaskDone& message);
   Result<bool> await_documents(const PeerId& peer, const Message& message,
                                NeededDocuments documents);
+  Result<bool> await_document_of(const PeerId& peer, const Message& message,
+                                 const std::string& job);
 
   // Frames and their folder, while a job runs and at its end (service_frames.cpp).
   void start_inspections();

@@ -20,6 +20,7 @@
 #include "coordinator/service/lock_keeper.h"
 #include "coordinator/service/permissions.h"
 #include "coordinator/service/plan_text.h"
+#include "coordinator/service/questions.h"
 #include "coordinator/service/service.h"
 #include "coordinator/service/submission.h"
 
@@ -32,6 +33,21 @@ void tell_lost(const std::string& job, const LostFiles& lost) {
                lost.tasks.size() > 1
                    ? fmt::format(", and something of {} more tasks", lost.tasks.size() - 1)
                    : "");
+}
+
+/// Frames that are not locked any more, and of which nothing is known but that they were, are the
+/// job's again.
+TasksReopened reopen_left_frames(const Digest& job, const Scheduler::Job& known,
+                                 const std::vector<FrameNumber>& frames) {
+  const std::set<FrameNumber> unlocked(frames.begin(), frames.end());
+  TasksReopened left{job, {}, "they are not locked any more"};
+  for (FrameIndex frame; frame.index() < known.spec.frames.size(); ++frame) {
+    const std::vector<BlobRef>& made = known.tasks.made().outputs(frame.value());
+    if (unlocked.contains(known.spec.frames[frame.index()]) && !made.empty() &&
+        made.front().is_placeholder())
+      left.tasks.push_back(assemble_task(frame));
+  }
+  return left;
 }
 
 }  // namespace
@@ -47,12 +63,11 @@ Status Service::restore_jobs() {
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
   for (const JobId& id : farm_.history.jobs().with_locks()) {
     // A folder may have been away when frames in it were locked or unlocked.
-    BATON_ASSIGN(const std::optional<std::string> text,
-                 farm_.journal.document(farm_.history.jobs().versions(id).back()));
-    const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
-    if (!document) continue;
-    BATON_TRY(LockKeeper(farm_).settle(document->job));
-    BATON_TRY(LockKeeper(farm_).tell_again(document->job, id));
+    const Digest newest = farm_.history.jobs().versions(id).back();
+    BATON_ASSIGN(const SharedDocument document, journalled_document(farm_.journal, newest));
+    if (!document->parsed) continue;
+    BATON_TRY(LockKeeper(farm_).settle(document->parsed->job));
+    BATON_TRY(LockKeeper(farm_).tell_again(document->parsed->job, id));
   }
   BATON_TRY(farm_.archive_ended());
   BATON_TRY(farm_.count_kept());
@@ -141,7 +156,10 @@ Status Service::restore_job(const Digest& digest) {
   }
   const JobStatus status = event.status;
   BATON_TRY(farm_.step(std::move(event)));
-  if (is_open(status)) BATON_TRY(LockKeeper(farm_).leave_frames(digest));
+  if (is_open(status)) {
+    BATON_TRY(farm_.history.take_up_times(digest, *farm_.scheduler.find_job(digest)));
+    BATON_TRY(LockKeeper(farm_).leave_frames(digest));
+  }
   if (lacks_mark) BATON_TRY(farm_.mark_output_again(digest));
   // What is locked stands in the mark; whoever was killed may not have come to that.
   if (const Result<std::string> marked = farm_.mark_output(digest); !marked) return marked.error();
@@ -206,22 +224,22 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
     pass(*job);
     tell_lost(farm_.history.name_of(*job), lost);
     const std::vector<std::string> reasons = lost_reasons(lost);
-    BATON_TRY(farm_.step(JobResumed{*job, std::move(lost.tasks)}));
+    BATON_TRY(farm_.step(TasksReopened{*job, std::move(lost.tasks)}));
+    BATON_TRY(farm_.step(JobResumed{*job}));
     plan = plan_text(*farm_.scheduler.find_job(*job), reasons);
   }
-  return answer_detail(peer, *job, std::move(plan));
+  return Questions(farm_).answer_detail(peer, *job, std::move(plan));
 }
 
 /// Frames are locked whose files are there and that nobody writes now.
 Status Service::receive(const PeerId& peer, const LockFrames& message) {
   const Result<Digest> job = resolve_own(message.job);
   if (!job) return farm_.refuse(peer, job.error());
-  BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
-  const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+  BATON_ASSIGN(const SharedDocument shared, journalled_document(farm_.journal, *job));
+  const Result<ParsedJobDocument>& document = shared->parsed;
   if (!document) return farm_.refuse(peer, document.error());
-  std::vector<FrameNumber> frames = message.frames;
-  std::ranges::sort(frames);
-  frames.erase(std::ranges::unique(frames).begin(), frames.end());
+  const std::set<FrameNumber> sorted(message.frames.begin(), message.frames.end());
+  const std::vector<FrameNumber> frames(sorted.begin(), sorted.end());
   LockKeeper locks(farm_);
   BATON_TRY(locks.settle(document->job));
   const JobId id = farm_.history.jobs().of(*job).id;
@@ -252,14 +270,12 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
     places = std::move(found).value();
     std::ranges::set_union(before, frames, std::back_inserter(after));
   }
-  // How the frames of a job that has ended stand then.
-  std::string fault;
+  // Of a job that has ended it counts how its frames stand then.
   if (!is_open_now && !is_away) {
     const LockedFrames locked(document->job, after);
     BATON_ASSIGN(const std::optional<OddFrames> odd,
                  await_frames(peer, message, {*job, id}, document->job, locked));
     if (!odd) return {};
-    fault = fault_text(*odd, id);
   }
   // A lock that others cannot see is none: they would replace the frame.
   if (!message.off) {
@@ -273,23 +289,34 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
+  if (message.off && is_open_now) BATON_TRY(farm_.step(reopen_left_frames(*job, *known, frames)));
   if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
-  if (message.off) {
-    BATON_TRY(locks.tell_again(document->job, id));
-  }
-  // A job that has failed for its frames alone, or was done before some were unlocked, ends as they
-  // stand now.
-  if (is_away) return answer_detail(peer, *job);
-  if (message.off && !is_open_now && fault.empty()) {
+  if (message.off) BATON_TRY(locks.tell_again(document->job, id));
+  if (!is_away && !is_open_now)
+    BATON_TRY(end_as_frames_stand(*document, {*job, id}, after, message.off ? &frames : nullptr));
+  return Questions(farm_).answer_detail(peer, farm_.history.jobs().versions(id).back());
+}
+
+/// A job that has failed for its frames alone, or was done before some were unlocked (null: none
+/// were), ends as they stand now. All of them were looked at.
+Status Service::end_as_frames_stand(const ParsedJobDocument& document, const JobVersion& version,
+                                    const std::vector<FrameNumber>& locked,
+                                    const std::vector<FrameNumber>* unlocked) {
+  const JobSpec& spec = document.job;
+  BATON_ASSIGN(const FolderRecord record,
+               FolderRecord::read(farm_.journal, farm_.history.jobs(), spec.output.directory,
+                                  version.document, version.id));
+  std::string fault =
+      fault_text(find_odd_frames(record, files_, spec, LockedFrames(spec, locked)), version.id);
+  if (unlocked != nullptr && fault.empty()) {
     // Behind a lock a frame may be of another picture.
-    const Status is_free = Submission(farm_, files_, speaker_).expect_free_folder(*document);
+    const Status is_free = Submission(farm_, files_, speaker_).expect_free_folder(document);
     if (!is_free) fault = is_free.error().message;
   }
-  BATON_ASSIGN(const bool ends_again, farm_.ended_by_frames(*job, fault, message.off));
-  if (ends_again && fault.empty())
-    BATON_TRY(
-        Submission(farm_, files_, speaker_).submit(PeerId(), *document, {*text, false, true}, {}));
-  return answer_detail(peer, farm_.history.jobs().versions(id).back());
+  BATON_ASSIGN(const bool ends_again, farm_.ended_by_frames(version.document, fault, unlocked));
+  if (!ends_again || !fault.empty()) return {};
+  // The journal has the document.
+  return Submission(farm_, files_, speaker_).submit(PeerId(), document, {{}, false, true}, {});
 }
 
 /// The scheduler's order changes, and no document.
@@ -311,14 +338,14 @@ Status Service::receive(const PeerId& peer, const SetPriority& message) {
   if (const Status may = check_priority(speaker_, message.priority, farm_.options.user_priority);
       !may)
     return farm_.refuse(peer, may.error());
-  BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
-  const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+  BATON_ASSIGN(const SharedDocument shared, journalled_document(farm_.journal, *job));
+  const Result<ParsedJobDocument>& document = shared->parsed;
   if (!document) return farm_.refuse(peer, document.error());
   spdlog::info("job {}: priority {}, it was {}", name, message.priority, known->spec.priority);
   BATON_TRY(farm_.history.prioritized(*job, known->spec.priority,
                                       {document->job.priority, message.priority}));
   BATON_TRY(farm_.step(PriorityChanged{*job, message.priority}));
-  return answer_detail(peer, *job);
+  return Questions(farm_).answer_detail(peer, *job);
 }
 
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
@@ -331,8 +358,8 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
                                                              job_status_name(known->status))});
   }
   const JobId id = farm_.history.jobs().of(*job).id;
-  BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(*job));
-  const Result<ParsedJobDocument> document = parse_farm_document(text.value_or(""));
+  BATON_ASSIGN(const SharedDocument shared, journalled_document(farm_.journal, *job));
+  const Result<ParsedJobDocument>& document = shared->parsed;
   const std::vector<FrameNumber> locked = farm_.history.jobs().locked(id);
   if (document && !locked.empty()) {
     BATON_TRY(farm_.history.locked(*job, locked, false, lock_time_ms(farm_.history.jobs(), id)));
@@ -348,7 +375,7 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   }
   BATON_TRY(farm_.history.deleted(*job));
   spdlog::info("job {} is deleted", name);
-  return receive(peer, ListJobs{});
+  return Questions(farm_).answer(peer, ListJobs{});
 }
 
 Status Service::receive(const PeerId& peer, const OrderWorker& message) {
@@ -378,7 +405,7 @@ Status Service::receive(const PeerId& peer, const OrderWorker& message) {
       BATON_TRY(farm_.history.happened(FarmEventKind::worker_released, worker));
       break;
   }
-  return receive(peer, ListJobs{});
+  return Questions(farm_).answer(peer, ListJobs{});
 }
 
 Status Service::receive(const PeerId& peer, const StopCoordinator&) {
@@ -394,7 +421,7 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
   const Result<Digest> job = resolve_own(prefix);
   if (!job) return farm_.refuse(peer, job.error());
   BATON_TRY(farm_.step(E{*job}));
-  return answer_detail(peer, *job);
+  return Questions(farm_).answer_detail(peer, *job);
 }
 
 }  // namespace baton

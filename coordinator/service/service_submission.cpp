@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <utility>
 
 #include "common/base/limits.h"
@@ -11,23 +13,29 @@
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/lock_keeper.h"
 #include "coordinator/service/permissions.h"
+#include "coordinator/service/requeue.h"
 #include "coordinator/service/service.h"
 #include "coordinator/service/submission.h"
 
 namespace baton {
 namespace {
 
-/// Error, io: something that is no folder stands in its place, or in that of a folder around it.
-/// Nothing is made; a disk that takes nothing now is waited for.
+/// Error, io: something that is no folder stands in its place, or in that of a folder around it, or
+/// nothing can be written there by right. Nothing is made; a disk that is full now is waited for.
 Status expect_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::path there = folder;
   while (!exists(std::filesystem::symlink_status(there, error)) && there.has_relative_path())
     there = there.parent_path();
-  if (is_directory(std::filesystem::status(there, error))) return {};
+  std::string fault = " is no folder";
+  if (is_directory(std::filesystem::status(there, error))) {
+    if (::access(there.c_str(), W_OK | X_OK) == 0 || (errno != EROFS && errno != EACCES)) return {};
+    error = {errno, std::generic_category()};
+  }
+  if (error) fault = ": " + error.message();
   return Error{ErrorKind::io,
-               fmt::format("{}: the output folder cannot be made: {}{}", folder.string(),
-                           there.string(), error ? ": " + error.message() : " is no folder")};
+               fmt::format("{}: the output folder cannot be {}: {}{}", folder.string(),
+                           there == folder ? "written" : "made", there.string(), fault)};
 }
 
 /// Error, usage: a user's key has no right to write into the folder: it lies in one that a job of
@@ -122,8 +130,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   }
   const Scheduler::Job* const known = farm_.scheduler.find_job(document->digest);
   const bool runs = known != nullptr && known->status == JobStatus::running;
-  const std::optional<JobSpec> newest = submission.newest_spec(id);
-  const std::string fault = fault_text(*odd, id, newest ? &*newest : nullptr);
+  const SharedDocument newest = submission.newest_document(id);
+  const std::string fault = fault_text(*odd, id, newest ? &newest->parsed->job : nullptr);
   const bool may_replace = message.restart && odd->doubt.locked_absent.empty();
   if (!odd->unreadable.empty() && !may_replace && !runs && may_pass(document->digest))
     return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + odd->unreadable});
@@ -132,6 +140,48 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     return farm_.refuse(peer,
                         {ErrorKind::io, fmt::format("job '{}': {}", document->job.name, fault)});
   return submission.submit(peer, *document, wanted, odd->doubt.strange);
+}
+
+/// What a submission would do that wants frames again, after all that would be in its way.
+Status Service::receive(const PeerId& peer, const AskRequeue& message) {
+  const Result<Digest> job = resolve_own(message.job);
+  if (!job) return farm_.refuse(peer, job.error());
+  BATON_ASSIGN(const SharedDocument shared, journalled_document(farm_.journal, *job));
+  if (!shared->parsed) return farm_.refuse(peer, shared->parsed.error());
+  BATON_ASSIGN(JournalledJob known, farm_.journal.load(*job));
+  JobSpec spec = shared->parsed->job;
+  spec.leading_runs = known.plan.leading_runs;
+  const JobVersion version{*job, farm_.history.jobs().of(*job).id};
+  const LockedFrames locked = farm_.locked(*job, spec);
+  const auto frames = frames_to_requeue(spec, message.frames, locked);
+  if (!frames) return farm_.refuse(peer, frames.error());
+  const bool is_open_now = is_open(known.status);
+  Submission submission(farm_, files_, speaker_);
+  if (!is_open_now) {
+    const Status strange = expect_no_strange_locks(spec, farm_.history.jobs(), version.id);
+    if (!strange) return farm_.refuse(peer, strange.error());
+    BATON_ASSIGN(const std::optional<OddFrames> odd,
+                 await_frames(peer, message, version, spec, locked));
+    if (!odd) return {};
+    const std::string fault = fault_text(*odd, version.id);
+    if (!fault.empty())
+      return farm_.refuse(peer, {ErrorKind::io, fmt::format("job '{}': {}", spec.name, fault)});
+    if (const Status is_free = submission.expect_free_folder(*shared->parsed); !is_free)
+      return farm_.refuse(peer, is_free.error());
+  }
+  const LostFiles lost = find_lost_files({.job = *job,
+                                          .spec = spec,
+                                          .completions = known.completions,
+                                          .failures = {},
+                                          .plan = known.plan},
+                                         farm_.store, files_, locked);
+  if (lost.unreadable) return farm_.refuse(peer, {ErrorKind::io, *lost.unreadable});
+  RequeuePlan plan = plan_requeue(spec, known, lost, *frames,
+                                  is_open_now ? std::nullopt : std::optional(known.status));
+  if (farm_.options.mixed_builds)
+    plan.plan += "where builds are mixed, what comes out is not compared with what was there\n";
+  plan.identity = farm_.history.jobs().of(*job);
+  return farm_.reply(peer, std::move(plan));
 }
 
 /// The frames that a message about a job would replace or keep. nullopt: some must be read, and the

@@ -15,6 +15,7 @@
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/neighbour.h"
 #include "coordinator/service/plan_text.h"
+#include "coordinator/service/requeue.h"
 
 namespace baton {
 
@@ -41,15 +42,12 @@ Result<std::vector<Submission::InFolder>*> Submission::jobs_in(const std::string
   BATON_ASSIGN(const std::vector<Digest> jobs, jobs_in_folder(farm_.journal, folder));
   for (const Digest& job : jobs) {
     BATON_ASSIGN(JournalledJob known, farm_.journal.load(job));
-    Result<ParsedJobDocument> document = parse_farm_document(known.document);
-    if (!document) continue;
-    FormerJob former{std::move(document).value(),
-                     std::move(known.completions.tasks),
-                     std::move(known.plan),
-                     known.status,
-                     std::move(known.completions.frames),
-                     std::move(known.renderer),
-                     known.is_mixed};
+    BATON_ASSIGN(const SharedDocument document, journalled_document(farm_.journal, job));
+    if (!document->parsed) continue;
+    FormerJob former{
+        *document->parsed, std::move(known.completions.tasks),  std::move(known.plan),
+        known.status,      std::move(known.completions.frames), std::move(known.renderer),
+        known.is_mixed};
     former.document.job.leading_runs = former.plan.leading_runs;
     former.document.job.output.directory = folder;
     entry->second.push_back({job, std::move(former)});
@@ -84,6 +82,7 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
                                                            const JobId& job, bool restart) {
   std::vector<Neighbour> others;
   BATON_ASSIGN(const auto* neighbours, jobs_in(document.job.output.directory));
+  const FramesByFile frames(document);
   for (const auto& [digest, former] : *neighbours) {
     if (digest == document.digest) continue;
     BATON_ASSIGN(const std::optional<JobDetail> ended, farm_.archived_detail(digest));
@@ -94,7 +93,7 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
                           : LockedFrames(former.document.job, farm_.history.jobs().locked(who.id)),
                       LockedFrames(document.job, farm_.history.jobs().locked(job))};
     Neighbour other =
-        look_at(former, digest, document, files_, ended ? &ended->frames_done : nullptr, locks);
+        look_at(former, digest, frames, files_, ended ? &ended->frames_done : nullptr, locks);
     // What is only to be looked at makes way for the next look.
     const bool may_replace =
         restart || (document.job.output.is_look && former.document.job.output.is_look);
@@ -182,6 +181,10 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
   const bool is_new = farm_.history.jobs().of(document.digest).id.empty();
   if (const Status own = farm_.check_own(speaker_, document.digest); !is_new && !own)
     return farm_.refuse(peer, own.error());
+  const Result<std::set<FrameIndex>> again =
+      frames_to_requeue(document.job, message.again, farm_.locked(document.digest, document.job));
+  if (!again) return farm_.refuse(peer, again.error());
+  again_ = *again;
   // What cannot go on, since nobody renders as it was rendered, begins again.
   const bool begins_again = known != nullptr && message.restart &&
                             farm_.scheduler.leases().nobody_renders_as(known->renderer);
@@ -193,6 +196,7 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
     BATON_TRY(begin_growth(document, message.restart));
     if (!message.keep_priority) BATON_TRY(take_priority(document));
+    BATON_TRY(tell_requeue(document));
     return go_on(peer, document.digest, message.restart);
   }
 
@@ -214,10 +218,12 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
     return farm_.refuse(peer, by_one.error());
   std::string changes = changes_text(document, id, message.keep_priority);
   if (message.restart) changes = changes.empty() ? "restart" : "restart; " + changes;
+  if (!again_.empty()) changes = "frames are wanted again";
   BATON_TRY(farm_.history.submitted(document.digest, id, changes));
   if (!message.keep_priority)
     BATON_TRY(farm_.history.forget_priority(document.digest, document.job.priority));
   if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));
+  BATON_TRY(tell_requeue(document));
   const std::set<std::string> files = frame_files(document.job, document.job.frames);
   BATON_TRY(farm_.take_back(id, [&](const std::string& file) { return !files.contains(file); }));
   BATON_TRY(begin_growth(document, message.restart));
@@ -225,29 +231,50 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
   return begin(peer, document, message, std::move(reasons));
 }
 
-std::optional<JobSpec> Submission::newest_spec(const JobId& job) {
+Status Submission::tell_requeue(const ParsedJobDocument& document) {
+  if (again_.empty()) return {};
+  std::vector<FrameNumber> frames;
+  for (const FrameIndex frame : again_) frames.push_back(document.job.frames[frame.index()]);
+  return farm_.history.requeued(document.digest, frames);
+}
+
+/// What has made frames that are to be rendered once more, or makes them now, is done again.
+Status Submission::requeue(const Digest& version) {
+  if (again_.empty()) return {};
+  const JobTasks& tasks = farm_.scheduler.find_job(version)->tasks;
+  std::vector<TaskKey> again = tasks_of_frames(tasks.graph(), again_);
+  std::erase_if(again, [&](const TaskKey& key) {
+    const std::optional<TaskIndex> task = tasks.graph().find(key);
+    const TaskStatus status = task ? tasks.book().status(*task) : TaskStatus::blocked;
+    return status != TaskStatus::done && status != TaskStatus::leased;
+  });
+  return farm_.step(TasksReopened{version, std::move(again), "somebody wants them again",
+                                  /*stops_leases=*/true});
+}
+
+SharedDocument Submission::newest_document(const JobId& job) {
   const std::vector<Digest> versions = farm_.history.jobs().versions(job);
-  if (versions.empty()) return std::nullopt;
-  const Result<std::optional<std::string>> text = farm_.journal.document(versions.back());
-  const auto document = parse_farm_document(text && *text ? **text : std::string());
-  return document ? std::optional(document->job) : std::nullopt;
+  if (versions.empty()) return nullptr;
+  const Result<SharedDocument> newest = journalled_document(farm_.journal, versions.back());
+  return newest && (*newest)->parsed ? *newest : nullptr;
 }
 
 /// What the document makes another of a job that is known; empty: nothing of its place in the queue
 /// and of its frames.
 std::string Submission::changes_text(const ParsedJobDocument& document, const JobId& job,
                                      bool keep_priority) {
-  const std::optional<JobSpec> before = newest_spec(job);
-  if (!before) return {};
+  const SharedDocument newest = newest_document(job);
+  if (newest == nullptr) return {};
+  const JobSpec& before = newest->parsed->job;
   std::vector<std::string> changes;
   const auto compare = [&](const char* what, auto is, auto was) {
     if (is != was) changes.push_back(fmt::format("{} {}, it was {}", what, is, was));
   };
   const IdentityBook& known = farm_.history.jobs();
   const std::int32_t written = document.job.priority;
-  compare("frames", format_frames(document.job.frames), format_frames(before->frames));
+  compare("frames", format_frames(document.job.frames), format_frames(before.frames));
   compare("priority", keep_priority ? known.priority(job, written) : written,
-          known.priority(job, before->priority));
+          known.priority(job, before.priority));
   return fmt::format("{}", fmt::join(changes, "; "));
 }
 
@@ -288,6 +315,7 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
   // The answer goes out before any lease of the job.
   const std::size_t place = farm_.num_replies();
   BATON_TRY(farm_.step(event));
+  BATON_TRY(requeue(digest));
   if (std::string line = undecided_text(farm_.scheduler, digest); message.restart && !line.empty())
     reasons.push_back(std::move(line));
   const Scheduler::Job& job = *farm_.scheduler.find_job(digest);
@@ -340,9 +368,10 @@ Status Submission::go_on(const PeerId& peer, const Digest& digest, bool restart)
   if (std::string line = undecided_text(farm_.scheduler, digest); restart && !line.empty())
     reasons.push_back(std::move(line));
   const std::size_t place = farm_.num_replies();
-  if (runs && !lost.tasks.empty()) BATON_TRY(farm_.step(JobPaused{digest}));
-  if (!runs || !lost.tasks.empty())
-    BATON_TRY(farm_.step(JobResumed{digest, std::move(lost.tasks)}));
+  BATON_TRY(farm_.step(TasksReopened{digest, std::move(lost.tasks)}));
+  BATON_TRY(requeue(digest));
+  // One whose frames are wanted again stays paused.
+  if (!runs && again_.empty()) BATON_TRY(farm_.step(JobResumed{digest}));
   const std::string plan = plan_text(*farm_.scheduler.find_job(digest), reasons);
   farm_.reply_at(place, peer, JobAccepted{farm_.history.jobs().of(digest), digest, true, plan});
   return {};

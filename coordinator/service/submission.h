@@ -3,12 +3,14 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "common/job/text/job_json.h"
 #include "coordinator/schedule/adoption.h"
 #include "coordinator/service/farm_core.h"
+#include "coordinator/service/farm_document.h"
 #include "coordinator/service/file_table.h"
 #include "coordinator/service/folder_record.h"
 #include "coordinator/service/job_report.h"
@@ -31,8 +33,8 @@ class Submission {
   /// Errors (bad_input, usage): why the document would be refused without --restart beside the jobs
   /// of its folder.
   Status expect_free_folder(const ParsedJobDocument& document);
-  /// A job by the newest of its documents; nullopt: it is new, or deleted.
-  std::optional<JobSpec> newest_spec(const JobId& job);
+  /// The newest of a job's documents; null: it is new, deleted, or cannot be read.
+  SharedDocument newest_document(const JobId& job);
   /// The job that the document is a version of, or becomes one; empty: a new one.
   Result<JobId> known_job(const ParsedJobDocument& document);
   /// A document of a job that may grow gets the sweeps that jobs of its picture have written in its
@@ -73,6 +75,8 @@ class Submission {
   Status begin_growth(const ParsedJobDocument& document, bool restart);
   Status add_sweeps(const Digest& version, int sweeps, const std::string& reason);
   Status disown(const Digest& job, const std::vector<FrameNumber>& frames, const std::string& by);
+  Status tell_requeue(const ParsedJobDocument& document);
+  Status requeue(const Digest& version);
   Status go_on(const PeerId& peer, const Digest& digest, bool restart);
   Status begin(const PeerId& peer, const ParsedJobDocument& document, const SubmitJob& message,
                std::vector<std::string> reasons);
@@ -90,6 +94,7 @@ class Submission {
   FarmCore& farm_;
   FileTable& files_;
   const Speaker& speaker_;
+  std::set<FrameIndex> again_;  ///< SubmitJob::again
   /// Read once: a submission changes nothing of what former jobs have done.
   std::map<std::string, std::vector<InFolder>> folders_;
 };

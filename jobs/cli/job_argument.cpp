@@ -3,7 +3,13 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
+#include <vector>
+
+#include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 #include "common/scene/settle/settle_motion.h"
+#include "jobs/cli/say.h"
 
 namespace baton {
 namespace {
@@ -98,6 +104,19 @@ void add_from_frame_option(CLI::App& command, std::optional<FrameNumber>& frame)
 Status begin_at(JobSpec& job, std::optional<FrameNumber> frame) {
   if (!frame) return {};
   const FrameNumber last = job.frames.back();
+  std::vector<FrameNumber> absent;
+  // Where the folder is not seen from here, nothing is known of it.
+  std::error_code error;
+  const std::filesystem::path folder = job.output.directory;
+  const bool is_seen = std::filesystem::is_directory(folder.parent_path(), error);
+  for (FrameIndex place; is_seen && place.index() < job.frames.size(); ++place) {
+    const FrameNumber number = job.frames[place.index()];
+    if (number < *frame && !std::filesystem::exists(frame_path(job, place), error))
+      absent.push_back(number);
+  }
+  if (!absent.empty())
+    tell("frames {} are not there, and stay so with --from-frame {}\n", format_frames(absent),
+         *frame);
   std::erase_if(job.frames, [&](FrameNumber number) { return number < *frame; });
   if (!job.frames.empty()) return {};
   return Error{ErrorKind::usage,

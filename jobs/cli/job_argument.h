@@ -38,7 +38,7 @@ Result<JobSpec> load_wanted(const JobArgument& argument, bool look = false);
 /// Adds --from-frame; frame: none, where it is not given.
 void add_from_frame_option(CLI::App& command, std::optional<FrameNumber>& frame);
 /// Leaves the frames from `frame` on, so that a job begins there afresh and those before stay with
-/// whichever job wrote them. Error: none is left.
+/// whichever job wrote them; says which of those are not there. Error: none is left.
 Status begin_at(JobSpec& job, std::optional<FrameNumber> frame);
 
 /// The same with settled motion, for what is rendered or estimated.

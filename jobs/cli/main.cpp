@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return static_cast<int>(app.exit(error) == 0 ? baton::ExitCode::ok : baton::ExitCode::usage);
+    return baton::end_parsing(app, error);
   }
   return static_cast<int>(code);
 }

@@ -205,6 +205,8 @@ Status write_conversations(const fs::path& folder) {
                           {kViewer, why},
                           {kViewer, ListTasks{id}},
                           {kViewer, ListEvents{}},
+                          {kViewer, AskRequeue{id, {FrameNumber(1)}}},
+                          {kViewer, AskPicture{id, false, FrameNumber(0), true}},
                           {kWorker, JobDocumentRequest{kJob}}}},
       {"orders", Words{{kOwner, PauseJob{id}},
                        {kOwner, ResumeJob{id}},

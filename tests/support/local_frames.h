@@ -15,7 +15,7 @@ using FrameSink = std::function<Status(Step step, const FilmTile& image)>;
 /// The image of the frame that is kept; adds what its tiles counted.
 inline Result<FilmTile> local_image(const LocalRender& render, const JobSpec& job, Step step,
                                     RenderStats& stats) {
-  FilmTile image = blank_image(job.image, render.tiles().begin()->second.film.channels);
+  FilmTile image = blank_image(job.image.rendered(), render.tiles().begin()->second.film.channels);
   for (const auto& [tile, first_pass] : render.tiles()) {
     BATON_ASSIGN(const RenderedTile finished, render.finished(step, tile));
     BATON_TRY(paste_tile(finished.film, image));

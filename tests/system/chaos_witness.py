@@ -181,7 +181,7 @@ def check_nothing_revoked(seen, returns, struck_ms, epochs, ends, ids):
 
 def reopened(log):
     """times_in() of what says that finished tasks of a job are done again."""
-    return times_in(log, r"\d+ finished tasks are done again")
+    return times_in(log, r"\d+ finished tasks? (?:is|are) done again")
 
 
 def superseded(log):
@@ -245,7 +245,7 @@ def count_repeated(seen):
 def check_repeated(seen, log, struck, num_workers, num_jobs, num_harmed):
     """Nothing is done again that no fault explains. struck: how often each kind of fault struck; num_harmed: files that
     were harmed. Returns (how many tasks were done again, how many the faults explain)."""
-    opened = re.findall(r"(\d+) finished tasks are done again, since (what|something)", log)
+    opened = re.findall(r"(\d+) finished tasks? (?:is|are) done again, since (what|something)", log)
     reopenings = [int(count) for count, _ in opened]
     files = sum(what == "something" for _, what in opened)
     # A new version may need what former ones did not keep.

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Sequences of edits of jobs, each submitted while the one before is at work: names of files, frames both ways, AOVs, sweeps,
-tiles; now and then with --restart. All workers give way to others, which render with another instruction set, and back. Waiters
+tiles; now and then with --restart, or frames once more. All workers give way to others, which render with another instruction set, and back. Waiters
 are killed. Of each version that is left alone until it is done, the last one among them, every frame must be there and right,
 all of them by one instruction set; no attempt may fail.
 
@@ -96,6 +96,16 @@ class Sequence:
         self.left -= 1
         self.waits_for_end = True
 
+    def requeue(self):
+        """Some frames once more, whether they are there, in work or still to come."""
+        shown = self.farm.show(self.job.id)
+        first = self.rng.randint(1, self.job.last)
+        frames = f"{first}-{self.rng.randint(first, self.job.last)}"
+        answer = self.farm.baton("job", "requeue", self.job.id, "--frames", frames, "--yes", expect=None)
+        self.diary.append(f"requeue {frames} of {shown['status']}")
+        is_refused = answer.returncode == BAD_INPUT and ("pixels may differ" in answer.stderr or "it has no frames" in answer.stderr)
+        check(answer.returncode == OK or is_refused, f"{self}: {answer.stderr}")
+
     def tend(self):
         """Edits the job when it is time. Returns whether it has ended."""
         if time.monotonic() < self.next_at:
@@ -113,6 +123,9 @@ class Sequence:
         elif self.left > 0 and self.turn > 0:
             self.submit_turn()
             return False
+        elif self.left > 0 and self.rng.random() < 0.25:
+            self.requeue()
+            self.left -= 1
         elif self.left > 0:
             what, settings = self.rng.choice(edits_of(self.job, self.rng))
             self.job.edit(**settings)

@@ -5,7 +5,7 @@ import json
 import re
 import time
 
-from farm import BAD_INPUT, FAILED, OK, PATIENCE, UNAVAILABLE, Farm, Process, check, check_equal, free_port, run_tests, wait_until
+from farm import BAD_INPUT, FAILED, IO, OK, PATIENCE, UNAVAILABLE, Farm, Process, check, check_equal, free_port, run_tests, wait_until
 from jobs import make_job, write_job
 
 TIMEOUT, CANCELLED, USAGE = 1, 3, 64
@@ -207,6 +207,60 @@ def what_workers_say_is_joined_with_what_happened(programs, folder):
         check("not seen from here, so only the events are shown" in hidden.stderr and "job done" in hidden.stdout, hidden.stderr)
         check_equal(len(farm.baton("job", "log", job, "--last", "3").stdout.splitlines()), 3, "lines of --last 3")
         check_equal((farm.work_folder / "logs").stat().st_mode & 0o077, 0, "rights of others in the logs")
+
+
+def frames_are_rendered_once_more(programs, folder):
+    """What it takes is said before, a person or --yes says so, and the frames are the same."""
+    with Farm(programs, folder / "farm", workers=1) as farm:
+        path = small_job(folder, frames="1-4")
+        job = farm.submit(path)
+        farm.wait_for(job)
+        frames = programs.pixels(folder / "frames")
+        times = {file: file.stat().st_mtime_ns for file in folder.glob("frames/*.exr")}
+        check_equal(len(times), 4, "frames")
+        told = json.loads(farm.baton("job", "requeue", job, "--frames", "2-3", "--dry-run", "--json").stdout)
+        check("frames 2-3 are rendered again" in told["plan"] and told["tasks"] > 2 and told["cpuSeconds"] > 0 and not told["requeued"], told)
+        for words, says in [(["--frames", "2-3"], "expected --yes, or --dry-run"), (["--frames", "2-9", "--yes"], "it has no frames 5-9")]:
+            done = farm.baton("job", "requeue", job, *words, expect=USAGE if "--yes" not in words else BAD_INPUT)
+            check(says in done.stderr, done.stderr)
+        check_equal(farm.show(job)["status"], "done", "status")
+        check("CPU time" in farm.baton("job", "requeue", job, "--frames", "2-3", "--yes").stdout, "cost")
+        farm.wait_for(job)
+        check_equal(programs.pixels(folder / "frames"), frames, "frames")
+        newer = sorted(file.name for file, time_ns in times.items() if file.stat().st_mtime_ns > time_ns)
+        check_equal(newer, ["frame.0002.exr", "frame.0003.exr"], "frames that were written again")
+        farm.baton("job", "lock", job, "--frames", "2")
+        check("frame 2 is locked" in farm.baton("job", "requeue", job, "--frames", "1-2", "--yes", expect=USAGE).stderr, "locked")
+        check("frames requeued" in farm.baton("farm", "events", "--job", job).stdout, "events")
+
+
+def pictures_of_a_job(programs, folder):
+    """The last frame as PNG; while one is in work, its tiles."""
+    with Farm(programs, folder / "farm") as farm:
+        job = farm.submit(small_job(folder, frames="1-30", image={"width": 96, "height": 64, "tileSize": 32}))
+        nothing = farm.baton("job", "picture", job, "--out", folder / "none.png", expect=BAD_INPUT)
+        check("no frame is written yet" in nothing.stderr and not (folder / "none.png").exists(), nothing.stderr)
+        farm.start_worker()
+
+        def partial():
+            """Of the job while it stands still."""
+            farm.baton("job", "pause", job)
+            wait_until(lambda: not json.loads(farm.baton("job", "tasks", job, "--running", "--json").stdout), "nothing runs")
+            shown = farm.baton("job", "picture", job, "--partial", "--json", "--out", folder / "part.png", expect=None)
+            row = json.loads(shown.stdout) if shown.returncode == OK else {}
+            farm.baton("job", "resume", job)
+            return row if 0 < row.get("tiles", 0) < row.get("tilesTotal", 0) else None
+
+        row = wait_until(partial, "some tiles of a frame")
+        check_equal((row["written"], row["tilesTotal"]), (False, 6), "a frame in work")
+        farm.wait_for(job)
+        last = json.loads(farm.baton("job", "picture", job, "--json", "--out", folder / "last.png").stdout)
+        check_equal((last["frame"], last["written"]), (30, True), "the last frame")
+        programs.run("baton", "view", last["file"], "--out", folder / "view.png")
+        check_equal((folder / "last.png").read_bytes(), (folder / "view.png").read_bytes(), "the picture")
+        away = folder / "away"
+        (folder / "frames").rename(away)
+        check("frame.0030.exr" in farm.baton("job", "picture", job, "--out", folder / "x.png", expect=IO).stderr, "a folder that is not seen")
 
 
 def a_failed_job_is_retried(programs, folder):

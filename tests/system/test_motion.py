@@ -80,7 +80,7 @@ def held_states(programs, folder):
                 check_equal(farm.show(job)["statesHeld"], 0, "states that a drained worker holds")
             farm.start_worker()
             farm.wait_for(job)
-            opened = "finished tasks are done again, since what worker" in farm.coordinator.log()
+            opened = "done again, since what worker" in farm.coordinator.log()
         check_equal(programs.pixels(folder / name / "frames"), expected, f"pixels where the first worker was {name}")
         check_equal(opened, end == "kill", f"tasks were opened again where the first worker was {name}")
 

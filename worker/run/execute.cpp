@@ -263,7 +263,7 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
       return Error{ErrorKind::bad_input,
                    fmt::format("{}: is not a new tile of frame index {}", blob_name(input), frame)};
     }
-    if (image.channels.empty()) image = blank_image(loaded.job.image, film.channels);
+    if (image.channels.empty()) image = blank_image(loaded.job.image.rendered(), film.channels);
     BATON_TRY(paste_tile(film, image));
     pasted[static_cast<std::size_t>(input.tile)] = true;
   }

@@ -17,13 +17,6 @@
 
 namespace baton {
 
-/// A black image of the job's size.
-FilmTile blank_image(const ImageSpec& spec, std::vector<std::string> channels);
-
-/// Copies the pixels of `tile` into `image`. Error when the channels differ or the tile leaves the
-/// image.
-Status paste_tile(const FilmTile& tile, FilmTile& image);
-
 /// Rows of a frame that are compared with its film after it was written: one block of compression.
 inline constexpr int kRowsVerified = 16;
 

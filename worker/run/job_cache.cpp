@@ -156,9 +156,9 @@ void JobEntry::provide(const JobDocument& document) {
   changed_.notify_all();
 }
 
-bool JobEntry::has_document() const {
+std::optional<JobDocument> JobEntry::document() const {
   const std::lock_guard lock(mutex_);
-  return document_.has_value();
+  return document_;
 }
 
 bool JobEntry::failed() const {

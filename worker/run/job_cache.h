@@ -86,7 +86,7 @@ class JobEntry {
   const Digest& digest() const { return digest_; }
   /// Hands over the document; a second one is ignored.
   void provide(const JobDocument& document);
-  bool has_document() const;
+  std::optional<JobDocument> document() const;
   /// True once loading has failed, or the machine has not seen the job's folders.
   bool failed() const;
   /// Null unless it is loaded.

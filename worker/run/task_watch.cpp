@@ -1,13 +1,15 @@
 #include "worker/run/task_watch.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace baton {
 
-TaskWatch::Mark::Mark(TaskWatch& watch, const LeaseId& lease, TimePoint deadline)
+TaskWatch::Mark::Mark(TaskWatch& watch, const LeaseId& lease, TimePoint deadline,
+                      std::string replay)
     : watch_(watch), lease_(lease) {
   const std::lock_guard lock(watch_.mutex_);
-  watch_.entries_.insert_or_assign(lease, Entry{deadline, false});
+  watch_.entries_.insert_or_assign(lease, Entry{deadline, std::move(replay)});
 }
 
 TaskWatch::Mark::~Mark() {
@@ -15,13 +17,13 @@ TaskWatch::Mark::~Mark() {
   watch_.entries_.erase(lease_);
 }
 
-std::vector<LeaseId> TaskWatch::take_overdue(TimePoint now) {
+std::vector<TaskWatch::Overdue> TaskWatch::take_overdue(TimePoint now) {
   const std::lock_guard lock(mutex_);
-  std::vector<LeaseId> overdue;
+  std::vector<Overdue> overdue;
   for (auto& [lease, entry] : entries_) {
     if (entry.taken || now <= entry.deadline) continue;
     entry.taken = true;
-    overdue.push_back(lease);
+    overdue.push_back({lease, entry.replay});
   }
   return overdue;
 }

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <map>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "common/job/task.h"
@@ -22,7 +23,8 @@ class TaskWatch {
   /// A task is watched as long as its mark lives.
   class Mark {
    public:
-    Mark(TaskWatch& watch, const LeaseId& lease, TimePoint deadline);
+    /// replay: the command that repeats the task.
+    Mark(TaskWatch& watch, const LeaseId& lease, TimePoint deadline, std::string replay = {});
     ~Mark();
     Mark(const Mark&) = delete;
     Mark& operator=(const Mark&) = delete;
@@ -32,14 +34,21 @@ class TaskWatch {
     const LeaseId lease_;
   };
 
+  struct Overdue {
+    LeaseId lease;
+    std::string replay;
+
+    bool operator==(const Overdue&) const = default;
+  };
   /// The tasks whose deadline has passed; each is named once.
-  std::vector<LeaseId> take_overdue(TimePoint now);
+  std::vector<Overdue> take_overdue(TimePoint now);
   /// Whether a task is still in work kStopPatience after its deadline.
   bool is_stuck(TimePoint now) const;
 
  private:
   struct Entry {
     TimePoint deadline;
+    std::string replay;
     bool taken = false;
   };
   mutable std::mutex mutex_;

@@ -72,14 +72,34 @@ SessionOptions session_options(const WorkerOptions& options) {
   return {std::move(identity), options.give_up, end_at, options.idle_exit, options.drain};
 }
 
-/// Saves the job where a replay can read it. Returns its path.
-Result<std::filesystem::path> save_job(const LoadedJob& loaded, const BlobStore& store) {
-  const std::filesystem::path path = store.job_file(loaded.digest);
+/// Saves the job where a replay can read it. Returns the command that repeats the task: up to the
+/// last frame of its run, or the frame of its second pass. Empty: of an assembly, or a later sweep.
+Result<std::string> prepare_replay(const JobSpec& job, const BlobStore& store, const Grant& grant) {
+  const Step last = grant.steps.last;
+  const bool has_frame = last >= Step(0) && last.index() < job.frames.size();
+  if (grant.lease.task.kind == TaskKind::assemble || !has_frame) return std::string();
+  const std::filesystem::path path = store.job_file(grant.lease.job);
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) {
-    BATON_TRY(write_file_atomic(path, as_bytes_view(to_json(loaded.context->job))));
-  }
-  return path;
+  if (!std::filesystem::exists(path, error))
+    BATON_TRY(write_file_atomic(path, as_bytes_view(to_json(job))));
+  return replay_command(path, job.frames[last.index()], grant.lease.task.tile);
+}
+
+/// The error with the command, if there is one.
+Error with_replay(const Error& error, const std::string& command) {
+  if (command.empty() || error.kind == ErrorKind::cancelled || error.kind == ErrorKind::no_space)
+    return error;
+  return {error.kind, fmt::format("{}\nto replay it alone: {}", error.message, command)};
+}
+
+/// Why the job could not be loaded, such as a file that is not there.
+Error loading_failed(const QueuedTask& task, const Error& error) {
+  const std::optional<JobDocument> document = task.job->document();
+  if (!document || error.kind == ErrorKind::cancelled) return error;
+  const Result<ParsedJobDocument> parsed = parse_job_document(document->json);
+  const Result<std::string> command =
+      parsed ? prepare_replay(parsed->job, *task.store, task.grant) : std::string();
+  return with_replay(error, command ? *command : std::string());
 }
 
 /// Notes that the process had.
@@ -115,15 +135,20 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
   {
     const TaskWatch::Mark loading(watch, task.grant.lease,
                                   std::chrono::steady_clock::now() + kLoadPatience);
-    BATON_ASSIGN(loaded, task.job->load(stop));
+    Result<LoadedJobPtr> result = task.job->load(stop);
+    if (!result) return loading_failed(task, result.error());
+    loaded = std::move(result).value();
   }
   if (!loaded->unseen.empty()) {
     notes.report(loaded->digest, {loaded->unseen});
     return TaskResult{.made = {}, .unseen = loaded->unseen};
   }
+  BATON_ASSIGN(const std::string command,
+               prepare_replay(loaded->context->job, *task.store, task.grant));
   const TaskWatch::Mark mark(
       watch, task.grant.lease,
-      std::chrono::steady_clock::now() + std::chrono::seconds(loaded->job.max_seconds_per_task));
+      std::chrono::steady_clock::now() + std::chrono::seconds(loaded->job.max_seconds_per_task),
+      command);
   const TaskKey& key = task.grant.lease.task;
   // Again for each frame: links may have changed.
   BATON_TRY(check_output_root(loaded->job, loaded->roots));
@@ -140,22 +165,11 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
     return frame;
   }
 
-  // A replay renders up to the last frame of the run, or the frame of the second pass.
-  std::string command;
-  const std::vector<FrameNumber>& numbers = loaded->job.frames;
-  const Step last = task.grant.steps.last;
-  if (last >= Step(0) && last.index() < numbers.size()) {
-    BATON_ASSIGN(const std::filesystem::path path, save_job(*loaded, *task.store));
-    command = replay_command(path, numbers[last.index()], key.tile);
-  }
   const CrashNote note(command);
   Result<TaskResult> output = execute_task(*loaded, *task.store, task.grant, stop, &left);
   if (output) output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key));
-  if (output || output.error().kind == ErrorKind::cancelled ||
-      output.error().kind == ErrorKind::no_space)
-    return output;
-  return Error{output.error().kind,
-               fmt::format("{}\nto replay it alone: {}", output.error().message, command)};
+  if (output) return output;
+  return with_replay(output.error(), command);
 }
 
 /// What waiting for the disk may take; after it the tasks count as failed.
@@ -260,13 +274,13 @@ class Worker {
   /// Reports tasks that take too long as failed and asks them to stop. One that does not would keep
   /// its thread for ever: nothing but the end of the process frees it.
   void end_overdue_tasks() {
-    for (const LeaseId& lease : watch_.take_overdue(now())) {
-      threads_.stop(lease);
-      TaskEnded ended{
-          lease,
-          Error{
-              ErrorKind::timeout,
-              "ran for longer than maxSecondsPerTask, or loaded its job for a quarter of an hour"}};
+    for (const TaskWatch::Overdue& task : watch_.take_overdue(now())) {
+      threads_.stop(task.lease);
+      TaskEnded ended{task.lease,
+                      with_replay({ErrorKind::timeout,
+                                   "ran for longer than maxSecondsPerTask, or loaded its job for a "
+                                   "quarter of an hour"},
+                                  task.replay)};
       log_end(ended);
       step(std::move(ended));
     }
@@ -334,7 +348,7 @@ class Worker {
   }
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.grant.lease.job);
-    const bool missing = !job->has_document();
+    const bool missing = !job->document();
     if (steps_.size() >= limits::kMaxLeasesPerWorker) steps_.clear();
     steps_[action.grant.lease] = action.grant.steps;
     if (!missing)

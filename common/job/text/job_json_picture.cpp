@@ -139,12 +139,13 @@ Digest camera_facts(const JobSpec& job, const std::vector<FrameNumber>& frames) 
   return digest_of(writer.bytes());
 }
 
-/// frames: at which objects are looked at.
-Digest object_facts(const JobSpec& job, const std::vector<FrameNumber>& frames) {
+/// frames: at which objects that move are looked at.
+Digest object_facts(const std::vector<const ObjectSpec*>& moving, KeyCurve curve,
+                    const std::vector<FrameNumber>& frames) {
   ByteWriter writer;
-  for (const ObjectSpec& object : job.scene.objects) {
-    for (std::size_t i = 0; moves(object) && i < frames.size(); ++i) {
-      const Transform pose = object_motion_at(object, job.motion.curve, frames[i].value());
+  for (const ObjectSpec* object : moving) {
+    for (const FrameNumber frame : frames) {
+      const Transform pose = object_motion_at(*object, curve, frame.value());
       for (const float x : pose.linear.m) writer.put(x);
       put(writer, pose.offset);
     }
@@ -188,81 +189,97 @@ std::vector<std::string> picture_differences(const ParsedJobDocument& a,
   return {differences.begin(), differences.end()};
 }
 
-std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDocument& document,
-                                                              bool with_motion) {
-  const std::map<std::string, Digest> contents = contents_of(document);
-  std::vector<Facts> facts;
-  for (const FrameNumber frame : document.job.frames) {
-    std::vector<FrameNumber> poses{frame};
-    if (with_motion) poses = {frame - 1, frame, frame + 1};
-    facts.push_back({light_facts(document.job.environment, frame, contents),
-                     camera_facts(document.job, poses), object_facts(document.job, poses)});
+FrameComparison::Frames::Frames(const ParsedJobDocument& document)
+    : document_(&document), contents_(contents_of(document)), facts_(document.job.frames.size()) {
+  for (const ObjectSpec& object : document.job.scene.objects) {
+    if (moves(object)) moving_.push_back(&object);
   }
-  return facts;
 }
 
-std::vector<Digest> FrameComparison::plates_of(const ParsedJobDocument& document) {
-  const JobSpec& job = document.job;
-  std::vector<Digest> plates(job.frames.size());
-  if (!has_plate(job.output)) return plates;
-  const std::map<std::string, Digest> contents = contents_of(document);
-  for (std::size_t i = 0; i < plates.size(); ++i) {
-    const auto plate = contents.find(file_at(*job.output.plate, job.frames[i]));
-    if (plate != contents.end()) plates[i] = plate->second;
-  }
-  return plates;
+std::size_t FrameComparison::Frames::num_sweeps() const {
+  return static_cast<std::size_t>(document_->job.quality.sweeps);
+}
+
+const FrameComparison::Facts& FrameComparison::Frames::facts(FrameIndex frame, bool with_motion) {
+  std::optional<Facts>& facts = facts_[frame.index()];
+  if (facts) return *facts;
+  const JobSpec& job = document_->job;
+  const FrameNumber at = number(frame);
+  std::vector<FrameNumber> poses{at};
+  if (with_motion) poses = {at - 1, at, at + 1};
+  facts = Facts{light_facts(job.environment, at, contents_), camera_facts(job, poses),
+                object_facts(moving_, job.motion.curve, poses)};
+  return *facts;
+}
+
+Digest FrameComparison::Frames::plate(FrameIndex frame) const {
+  const OutputSpec& output = document_->job.output;
+  if (!has_plate(output)) return {};
+  const auto plate = contents_.find(file_at(*output.plate, number(frame)));
+  return plate == contents_.end() ? Digest() : plate->second;
 }
 
 FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b)
-    : frames_a_(a.job.frames),
-      frames_b_(b.job.frames),
+    : a_(a),
+      b_(b),
       with_motion_(has_aov(a.job, Aov::motion) && has_aov(b.job, Aov::motion)),
-      sweeps_a_(static_cast<std::size_t>(a.job.quality.sweeps)),
-      sweeps_b_(static_cast<std::size_t>(b.job.quality.sweeps)),
-      a_(facts_of(a, with_motion_)),
-      b_(facts_of(b, with_motion_)),
-      plates_a_(plates_of(a)),
-      plates_b_(plates_of(b)),
-      carried_(carries_state(a.job) || carries_state(b.job)) {
-  while (num_common_ < std::min(a_.size(), b_.size()) &&
-         frames_a_[num_common_] == frames_b_[num_common_] && a_[num_common_] == b_[num_common_])
+      carried_(carries_state(a.job) || carries_state(b.job)) {}
+
+bool FrameComparison::show_the_same(FrameIndex frame_a, FrameIndex frame_b) const {
+  return a_.number(frame_a) == b_.number(frame_b) &&
+         a_.facts(frame_a, with_motion_) == b_.facts(frame_b, with_motion_);
+}
+
+/// Whether so many frames from the first on are the same.
+bool FrameComparison::have_common(std::size_t num_frames) const {
+  const std::size_t end = std::min({num_frames, a_.size(), b_.size()});
+  while (num_common_ < end) {
+    const FrameIndex next(static_cast<std::int32_t>(num_common_));
+    if (!show_the_same(next, next)) return false;
     ++num_common_;
+  }
+  return num_common_ >= num_frames;
+}
+
+bool FrameComparison::are_all_common() const {
+  return a_.size() == b_.size() && have_common(a_.size());
 }
 
 bool FrameComparison::are_equal(FrameIndex frame_a, FrameIndex frame_b) const {
-  return sweeps_a_ == sweeps_b_ && are_alike(frame_a, frame_b);
+  return a_.num_sweeps() == b_.num_sweeps() && are_alike(frame_a, frame_b);
 }
 
 bool FrameComparison::have_one_plate(FrameIndex frame_a, FrameIndex frame_b) const {
-  return plates_a_[frame_a.index()] == plates_b_[frame_b.index()];
+  return a_.plate(frame_a) == b_.plate(frame_b);
 }
 
 bool FrameComparison::are_alike(FrameIndex frame_a, FrameIndex frame_b) const {
-  const bool all_common = num_common_ == a_.size() && num_common_ == b_.size();
-  if (carried_ && std::min(sweeps_a_, sweeps_b_) > 1 && !all_common) return false;
-  if (carried_) return frame_a == frame_b && frame_a.index() < num_common_;
-  return frames_a_[frame_a.index()] == frames_b_[frame_b.index()] &&
-         a_[frame_a.index()] == b_[frame_b.index()];
+  if (!carried_) return show_the_same(frame_a, frame_b);
+  if (std::min(a_.num_sweeps(), b_.num_sweeps()) > 1 && !are_all_common()) return false;
+  return frame_a == frame_b && have_common(frame_a.index() + 1);
 }
 
-std::int32_t FrameComparison::num_common_steps() const {
-  const bool all_common = num_common_ == a_.size() && num_common_ == b_.size();
-  const std::size_t sweeps = all_common ? std::min(sweeps_a_, sweeps_b_) : 1;
-  return static_cast<std::int32_t>(num_common_ * sweeps);
+std::int32_t FrameComparison::num_common_steps(Step end) const {
+  const std::size_t sweeps = std::min(a_.num_sweeps(), b_.num_sweeps());
+  const std::size_t num_wanted = static_cast<std::size_t>(end.value());
+  if (sweeps > 1 && num_wanted > num_common_ && are_all_common())
+    return static_cast<std::int32_t>(std::min(a_.size() * sweeps, num_wanted));
+  have_common(num_wanted);
+  return static_cast<std::int32_t>(std::min(num_common_, num_wanted));
 }
 
 std::string FrameComparison::difference(FrameIndex frame_a, FrameIndex frame_b) const {
-  const Facts &a = a_[frame_a.index()], &b = b_[frame_b.index()];
-  const FrameNumber frame = frames_b_[frame_b.index()];
-  if (frames_a_[frame_a.index()] == frame && !(a == b)) {
+  const Facts &a = a_.facts(frame_a, with_motion_), &b = b_.facts(frame_b, with_motion_);
+  const FrameNumber frame = b_.number(frame_b);
+  if (a_.number(frame_a) == frame && !(a == b)) {
     const char* const what = !(a.light == b.light)     ? "$.environment"
                              : !(a.camera == b.camera) ? "$.camera.keys"
                                                        : "$.scene.objects: keys";
     return std::string(what) + (with_motion_ ? " around frame " : " at frame ") +
            std::to_string(frame.value());
   }
-  if (sweeps_a_ != sweeps_b_) return "$.quality.sweeps";
-  if (std::min(sweeps_a_, sweeps_b_) > 1)
+  if (a_.num_sweeps() != b_.num_sweeps()) return "$.quality.sweeps";
+  if (a_.num_sweeps() > 1)
     return "$.frames (samples are carried from the last frame to the first of the next sweep)";
   return "$.frames before frame " + std::to_string(frame.value()) + " (samples are carried)";
 }

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/base/limits.h"
 #include "common/job/text/job_json.h"
 
 namespace baton {
@@ -24,9 +27,11 @@ std::vector<std::string> picture_differences(const ParsedJobDocument& a,
 
 /// What two jobs show in their frames, for jobs of one picture digest: the number of a frame, its
 /// light with the contents of its maps, the camera and the poses of all that moves; where both show
-/// motion, those at the frame numbers one less and one more, too.
+/// motion, those at the frame numbers one less and one more, too. It looks at the frames that it is
+/// asked about and, where samples are carried, at those before.
 class FrameComparison {
  public:
+  /// Both outlive it.
   FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b);
 
   /// Whether frame `frame_a` of one and `frame_b` of the other have the same pixels: they are
@@ -37,8 +42,9 @@ class FrameComparison {
   bool are_alike(FrameIndex frame_a, FrameIndex frame_b) const;
   /// Whether frames with the same pixels are laid over the same plate, or over none.
   bool have_one_plate(FrameIndex frame_a, FrameIndex frame_b) const;
-  /// How many steps (common/job/plan/sequence.h) from the first on are the same in both.
-  std::int32_t num_common_steps() const;
+  /// How many steps (common/job/plan/sequence.h) from the first on are the same in both; those from
+  /// `end` on are not looked at.
+  std::int32_t num_common_steps(Step end = Step(limits::kMaxTasksPerJob)) const;
   /// What differs in two frames that are not equal: "$.camera.keys", ...; "$.frames" where it is
   /// the frames before.
   std::string difference(FrameIndex frame_a, FrameIndex frame_b) const;
@@ -48,16 +54,34 @@ class FrameComparison {
     Digest light, camera, objects;
     bool operator==(const Facts&) const = default;
   };
-  static std::vector<Facts> facts_of(const ParsedJobDocument& document, bool with_motion);
-  static std::vector<Digest> plates_of(const ParsedJobDocument& document);
+  /// The frames of one job.
+  class Frames {
+   public:
+    explicit Frames(const ParsedJobDocument& document);
+    std::size_t size() const { return facts_.size(); }
+    FrameNumber number(FrameIndex frame) const { return document_->job.frames[frame.index()]; }
+    std::size_t num_sweeps() const;
+    /// with_motion: the same for all frames.
+    const Facts& facts(FrameIndex frame, bool with_motion);
+    /// A digest of zeros: none.
+    Digest plate(FrameIndex frame) const;
 
-  std::vector<FrameNumber> frames_a_, frames_b_;
+   private:
+    const ParsedJobDocument* document_;
+    std::map<std::string, Digest> contents_;  ///< of assets, by path
+    std::vector<const ObjectSpec*> moving_;
+    std::vector<std::optional<Facts>> facts_;  ///< as far as they were asked for
+  };
+
+  bool show_the_same(FrameIndex frame_a, FrameIndex frame_b) const;
+  bool have_common(std::size_t num_frames) const;
+  bool are_all_common() const;
+
+  mutable Frames a_, b_;
   bool with_motion_;  ///< both have the AOV
-  std::size_t sweeps_a_, sweeps_b_;
-  std::vector<Facts> a_, b_;
-  std::vector<Digest> plates_a_, plates_b_;  ///< by frame; a digest of zeros: none
   bool carried_;
-  std::size_t num_common_ = 0;  ///< frames from the first on
+  /// Frames from the first on, as far as is known.
+  mutable std::size_t num_common_ = 0;
 };
 
 }  // namespace baton

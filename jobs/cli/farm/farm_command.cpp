@@ -227,6 +227,11 @@ void add_slurm_command(CLI::App& farm, ExitCode& code) {
 
 void add_farm_command(CLI::App& app, ExitCode& code) {
   CLI::App* farm = app.add_subcommand("farm", "Farms of several machines");
+  farm->footer(
+      "Examples:\n"
+      "  baton farm status --coordinator tcp://farm:5570\n"
+      "  baton farm events --since 2h --follow\n"
+      "  baton farm slurm job.json --nodes 1-8");
   farm->require_subcommand(1);
   add_slurm_command(*farm, code);
   add_events_command(*farm, code);

@@ -16,7 +16,9 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/job_list.h"
 #include "jobs/cli/farm/job_log.h"
+#include "jobs/cli/farm/job_picture.h"
 #include "jobs/cli/farm/job_questions.h"
+#include "jobs/cli/farm/job_requeue.h"
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
@@ -54,7 +56,6 @@ void print_accepted(const JobAccepted& accepted, bool json) {
                                          {"alreadyThere", accepted.already_there},
                                          {"plan", accepted.plan}},
                                         2));
-  ;
   say("{}\n", accepted.identity.id.hex());
   if (accepted.already_there) tell("an equal job is there already: it goes on\n");
   tell("{}", accepted.plan);
@@ -249,7 +250,8 @@ Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
       ++num_locked;
       continue;
     }
-    const Result<JobList> deleted = ask<JobList>(client, DeleteJob{shown.identity.id.hex()});
+    const Result<JobList> deleted =
+        ask_until_done<JobList>(client, DeleteJob{shown.identity.id.hex()});
     const bool is_others = !deleted && deleted.error().kind == ErrorKind::usage;
     if (!deleted && !(is_others && options.all_ended)) return deleted.error();
     ++(is_others ? num_others : num_deleted);
@@ -294,8 +296,10 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   const auto add = [&](const char* name, const char* what, const char* argument,
                        Action action) -> std::pair<CLI::App*, JobOptions*> {
     CLI::App* command = job->add_subcommand(name, what);
+    const bool is_file = argument == std::string("JOB");
+    command->footer(fmt::format("Example: baton job {} {}", name, is_file ? "job.json" : "shot7"));
     auto options = std::make_shared<JobOptions>();
-    if (argument == std::string("JOB")) {
+    if (is_file) {
       add_job_argument(*command, options->wanted);
     } else if (!std::string(argument).empty()) {
       command->add_option(argument, options->job, kJobHelp)->required();
@@ -315,11 +319,13 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   add("show", "One job: progress, statistics, failures", "ID", show);
   add_job_questions(*job, code);
   add_job_log(*job, code);
+  add_job_picture(*job, code);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
       change<PauseJob>);
   add("resume", "Goes on with a paused job", "ID", change<ResumeJob>);
   add("cancel", "Ends a job; finished frames stay", "ID", change<CancelJob>);
   add("retry", "Goes on with a failed or cancelled job where it stopped", "ID", retry);
+  add_job_requeue(*job, code);
   const auto [refines, refinement] =
       add("refine",
           "Adds rounds to a job: its frames become the mean of those and of the new ones; prints "

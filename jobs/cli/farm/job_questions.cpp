@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <limits>
 #include <optional>
 
 #include "common/base/limits.h"
@@ -137,7 +138,8 @@ Result<ExitCode> set(const SetOptions& options) {
     BATON_ASSIGN(priority, parse_priority(setting));
   }
   BATON_ASSIGN(RequestClient client, options.link.connect());
-  BATON_ASSIGN(const ShownJob job, ask<ShownJob>(client, SetPriority{options.job, priority}));
+  BATON_ASSIGN(const ShownJob job,
+               ask_until_done<ShownJob>(client, SetPriority{options.job, priority}));
   if (options.json) {
     fmt::print("{}\n", json_text(detail_json(job), 2));
   } else {
@@ -155,7 +157,7 @@ void add_job_questions(CLI::App& job, ExitCode& code) {
   why_job->add_option("ID", question->job, kJobHelp)->required();
   why_job->add_option("--frame", question->frame, "default: the first that is not written");
   why_job->add_option("--tile", question->tile, "of that frame, from 0")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   add_coordinator_options(*why_job, question->link);
   why_job->add_flag("--json", question->json, "an array of causes, the last one last");
   why_job->footer(

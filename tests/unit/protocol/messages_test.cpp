@@ -72,7 +72,7 @@ const std::vector<Message>& examples() {
       HelloAgain{},
       JobDocument{{3, 4}, "{}", "mark", {9}},
       Shutdown{},
-      SubmitJob{std::string("a\0b", 3), false, true},
+      SubmitJob{std::string("a\0b", 3), false, true, {FrameNumber(2)}},
       ListJobs{true},
       ShowJob{"abc"},
       CancelJob{"def"},
@@ -130,6 +130,19 @@ const std::vector<Message>& examples() {
       ReasonChain{{{ReasonKind::store, "no room", {9}, true, kPlace, {"w"}, 1.5, kUsual, 2, 3, 4}}},
       ListTasks{"abc"},
       TaskList{{{{9}, true, kPlace, "w", true, 1.5, kUsual, 6, "boom"}}},
+      AskRequeue{"abc", {FrameNumber(1), FrameNumber(5)}},
+      RequeuePlan{kIdentity, 3, 4.5, "frames 1-5 are rendered again"},
+      AskPicture{"abc", true, FrameNumber(3), true},
+      PictureSource{kIdentity,
+                    FrameNumber(3),
+                    true,
+                    "/shows/f.exr",
+                    {0, 0, 4, 3},
+                    {-1, -1, 5, 4},
+                    "/store",
+                    6,
+                    {kBlob},
+                    ", sweep 1 of 3"},
   };
   return messages;
 }
@@ -153,13 +166,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 18);
+  static_assert(kProtocolVersion == 19);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "729971750b38a510e723b88e6f094a98");
+  EXPECT_EQ(digest_of(all).hex(), "b6c348cfe9d3c904883ae59a044d1b0d");
 }
 
 // Names are one line, what is told may be several; documents and paths are bytes.
@@ -180,6 +193,7 @@ TEST(Messages, TextsAreLegible) {
   EXPECT_EQ(sent(EventList{{{.worker = odd}}}).events.at(0).worker, text);
   EXPECT_EQ(sent(SubmitJob{odd}).json, odd);
   EXPECT_EQ(sent(WorkerWelcome{0, 0, odd, ""}).store_directory, odd);
+  EXPECT_EQ(sent(PictureSource{.file = odd}).file, odd);
 }
 
 TEST(Messages, MembersArriveWhereTheyWereSent) {
@@ -192,7 +206,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x12\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x13\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -233,12 +247,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{19};
+  frames[0][5] = std::byte{20};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 19, this program speaks 18"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 20, this program speaks 19"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

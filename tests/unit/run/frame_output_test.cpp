@@ -42,7 +42,7 @@ FilmTile make_tile(const PixelRect& rect) {
 }
 
 FilmTile assembled(const JobSpec& job) {
-  FilmTile image = blank_image(job.image, {"R", "G", "B"});
+  FilmTile image = blank_image(job.image.rendered(), {"R", "G", "B"});
   const TileGrid grid(job.image);
   for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
     EXPECT_TRUE(paste_tile(make_tile(grid.rect(tile)), image));
@@ -56,7 +56,7 @@ TEST(FrameOutput, TilesMakeTheWholePicture) {
 }
 
 TEST(FrameOutput, ATileThatDoesNotBelongIsAnError) {
-  FilmTile image = blank_image(small_job("alien").image, {"R", "G", "B"});
+  FilmTile image = blank_image(small_job("alien").image.rendered(), {"R", "G", "B"});
   EXPECT_FALSE(paste_tile(make_tile({16, 0, 24, 8}), image));
   EXPECT_FALSE(paste_tile(make_tile({-1, 0, 4, 4}), image));
   FilmTile other_channels = make_tile({0, 0, 8, 8});

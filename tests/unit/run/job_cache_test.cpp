@@ -73,7 +73,7 @@ TEST(JobCache, AFailureIsForThatEntryAlone) {
 
   const auto second = cache.entry({1, 1});
   EXPECT_NE(first, second);
-  EXPECT_FALSE(second->has_document());
+  EXPECT_FALSE(second->document());
   second->provide({{}, "text"});
   EXPECT_TRUE(second->load({}));
 }
@@ -108,10 +108,10 @@ TEST(JobCache, TheOldestJobGoesFirst) {
   cache.entry({0, 1})->provide({{}, "text"});
   cache.entry({0, 2})->provide({{}, "text"});
   for (std::uint64_t i = 3; i <= limits::kMaxCachedJobs; ++i) (void)cache.entry({0, i});
-  EXPECT_TRUE(cache.entry({0, 1})->has_document());
+  EXPECT_TRUE(cache.entry({0, 1})->document());
   (void)cache.entry({9, 9});
-  EXPECT_TRUE(cache.entry({0, 1})->has_document());
-  EXPECT_FALSE(cache.entry({0, 2})->has_document());
+  EXPECT_TRUE(cache.entry({0, 1})->document());
+  EXPECT_FALSE(cache.entry({0, 2})->document());
 }
 
 // A task waits for its job's document. However many jobs come meanwhile, the document must reach
@@ -123,14 +123,14 @@ TEST(JobCache, AJobInUseIsNotForgotten) {
     held.push_back(cache.entry({0, i}));
   for (std::uint64_t i = 0; i < held.size(); ++i) {
     cache.entry({0, i})->provide({{}, "text"});
-    EXPECT_TRUE(held[i]->has_document()) << i;
+    EXPECT_TRUE(held[i]->document()) << i;
   }
 
   // Once nobody holds them, they are forgotten like all others.
   held.clear();
   for (std::uint64_t i = 0; i < limits::kMaxCachedJobs; ++i) (void)cache.entry({1, i});
   for (std::uint64_t i = 0; i < 3 * limits::kMaxCachedJobs; ++i)
-    EXPECT_FALSE(cache.entry({0, i})->has_document()) << i;
+    EXPECT_FALSE(cache.entry({0, i})->document()) << i;
 }
 
 /// A cache of jobs whose states are one pixel each.
@@ -173,7 +173,7 @@ class JobCacheStates : public testing::Test {
 TEST_F(JobCacheStates, OutliveTheScene) {
   ASSERT_TRUE(hold(load({1, 1}), 0));
   load_others(2);
-  EXPECT_FALSE(cache_->entry({1, 1})->has_document()) << "its scene is gone";
+  EXPECT_FALSE(cache_->entry({1, 1})->document()) << "its scene is gone";
   EXPECT_EQ(load({1, 1})->states->find(ref_of({1, 1}, 0)), state_);
 
   // Without being loaded again it can still publish them.

@@ -21,11 +21,13 @@ LeaseId watched_lease(std::int32_t tile) {
 TEST(TaskWatch, ATaskPastItsDeadlineIsNamedOnce) {
   TaskWatch watch;
   const TaskWatch::Mark quick(watch, watched_lease(1), kStart + 10s);
-  const TaskWatch::Mark slow(watch, watched_lease(2), kStart + 20s);
+  const TaskWatch::Mark slow(watch, watched_lease(2), kStart + 20s, "replay it");
   EXPECT_THAT(watch.take_overdue(kStart + 10s), IsEmpty());
-  EXPECT_THAT(watch.take_overdue(kStart + 11s), ElementsAre(watched_lease(1)));
+  EXPECT_THAT(watch.take_overdue(kStart + 11s),
+              ElementsAre(TaskWatch::Overdue{watched_lease(1), {}}));
   EXPECT_THAT(watch.take_overdue(kStart + 12s), IsEmpty());
-  EXPECT_THAT(watch.take_overdue(kStart + 21s), ElementsAre(watched_lease(2)));
+  EXPECT_THAT(watch.take_overdue(kStart + 21s),
+              ElementsAre(TaskWatch::Overdue{watched_lease(2), "replay it"}));
 }
 
 TEST(TaskWatch, ATaskThatEndedIsForgotten) {

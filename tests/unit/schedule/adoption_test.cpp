@@ -276,8 +276,9 @@ TEST(Adoption, AKeyChangesTheFramesThatItMoves) {
                      {.frame = 8, .position = {0, 2, 5}, .look_at = {}, .up = {0, 1, 0}}};
   JobSpec other = job;
   other.camera.keys[2].position.x = 1;
-  EXPECT_EQ(document_of(job).picture, document_of(other).picture);
-  const FrameComparison comparison(document_of(job), document_of(other));
+  const ParsedJobDocument document = document_of(job), other_document = document_of(other);
+  EXPECT_EQ(document.picture, other_document.picture);
+  const FrameComparison comparison(document, other_document);
   EXPECT_EQ(comparison.num_common_steps(), 5);
   EXPECT_FALSE(comparison.are_equal(FrameIndex(5), FrameIndex(5)));
   EXPECT_EQ(comparison.difference(FrameIndex(5), FrameIndex(5)), "$.camera.keys at frame 6");

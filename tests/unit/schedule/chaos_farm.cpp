@@ -275,10 +275,11 @@ void ChaosFarm::check_own_loss(const RecordReopened& a) const {
   for (const TaskKey& task : a.tasks) {
     // One that was lost before has made something for what another did again since.
     const std::set<std::string>& makers = makers_.at(task);
-    EXPECT_TRUE(std::any_of(
-        makers.begin(), makers.end(),
-        [&](const std::string& maker) { return a.gone == "what worker " + maker + " held"; }))
-        << a.gone << ": tile " << task.tile << " of run " << task.run().value()
+    EXPECT_TRUE(std::any_of(makers.begin(), makers.end(),
+                            [&](const std::string& maker) {
+                              return a.why == "what worker " + maker + " held is gone";
+                            }))
+        << a.why << ": tile " << task.tile << " of run " << task.run().value()
         << " is lost with another worker";
     EXPECT_LE(++frames[task.tile], spec_.state.checkpoint_every);
   }

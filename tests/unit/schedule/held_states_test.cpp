@@ -103,7 +103,7 @@ TEST_F(HeldStatesTest, WithTheHolderTheyAreGone) {
   const auto reopened = all_of<RecordReopened>(farm.step(WorkerLeft{"a"}));
   ASSERT_EQ(reopened.size(), 1u);
   EXPECT_EQ(reopened[0].tasks.size(), 4u);
-  EXPECT_EQ(reopened[0].gone, "what worker a held");
+  EXPECT_EQ(reopened[0].why, "what worker a held is gone");
   EXPECT_EQ(farm.progress().frames_done, 1u) << "the frame stays";
 }
 
@@ -140,7 +140,7 @@ TEST_F(HeldStatesTest, WhatAHolderDoesNotHaveIsMadeAgainOnce) {
   const auto reopened = all_of<RecordReopened>(actions);
   ASSERT_EQ(reopened.size(), 1u);
   EXPECT_EQ(reopened[0].tasks, std::vector{render(0, grant.inputs.front().tile)});
-  EXPECT_EQ(reopened[0].gone, "what worker a held");
+  EXPECT_EQ(reopened[0].why, "what worker a held is gone");
 
   bool is_made_again = false, are_others_held = false;
   for (GrantLease next = farm.ask_one("a"); next.lease.attempt > 0; next = farm.ask_one("a")) {

@@ -116,7 +116,7 @@ TEST_F(SchedulerTest, AJobWhoseTaskKeepsLosingItsWorkersIsPaused) {
     EXPECT_EQ(losses, limits::kMaxTaskLosses);
     EXPECT_EQ(farm.status(), JobStatus::paused);
     EXPECT_THAT(farm.scheduler.find_job(farm.job)->waits, HasSubstr("frames 1-2, tile 0"));
-    farm.step(JobResumed{farm.job, {}});
+    farm.step(JobResumed{farm.job});
   }
   EXPECT_EQ(farm.progress().tasks_failed, 0u);
   farm.step(WorkerJoined{"a", {}});
@@ -411,7 +411,7 @@ TEST(SchedulerFailures, AGrantSaysHowLongTasksTake) {
   EXPECT_EQ(finish_in(5), 10);
   EXPECT_EQ(finish_in(20), 9.5);
   EXPECT_EQ(farm.ask_one("a").expected_seconds, 20);
-  EXPECT_EQ(farm.scheduler.longest_task_seconds(), 20);
+  EXPECT_EQ(longest_task_seconds(farm.scheduler), 20);
 }
 
 // One worker's key is trusted with pixels, not with the end of a job.

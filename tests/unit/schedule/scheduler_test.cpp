@@ -155,7 +155,7 @@ TEST_F(SchedulerTest, AnotherResultThanBeforeKeepsAJobFromItsEnd) {
   EXPECT_EQ(again.progress().tasks_open, 0u);
   EXPECT_EQ(again.status(), JobStatus::paused);
   EXPECT_THAT(waits_for(again.scheduler, again.job, again.now), testing::HasSubstr("different"));
-  again.step(JobResumed{again.job, {}});
+  again.step(JobResumed{again.job});
   EXPECT_EQ(again.status(), JobStatus::done);
 }
 

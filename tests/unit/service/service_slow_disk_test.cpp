@@ -269,7 +269,7 @@ TEST_F(FileTableTest, LargeDocumentsAreParsedBesideTheLoop) {
   std::vector<Incoming> ready;
   const auto deadline = now + kPatience;
   while (ready.size() < 2 && std::chrono::steady_clock::now() < deadline) {
-    for (Incoming& message : waits.take_ready(table)) {
+    for (Incoming& message : waits.take_ready(table, std::chrono::steady_clock::now())) {
       // What it waited for is at hand while it is handled: why it is no document, too.
       const bool is_anna = message.speaker.name == "anna";
       const SharedDocument known = document_at_hand(digest_of(large(is_anna ? 'a' : 'c')));

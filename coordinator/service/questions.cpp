@@ -1,4 +1,5 @@
-// What is asked of anybody: jobs, tasks, workers and events. Nothing changes by it.
+#include "coordinator/service/questions.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +9,9 @@
 #include "common/base/limits.h"
 #include "common/store/worker_logs.h"
 #include "coordinator/service/answers.h"
+#include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
-#include "coordinator/service/service.h"
+#include "coordinator/service/picture_source.h"
 
 namespace baton {
 namespace {
@@ -46,7 +48,7 @@ Result<std::vector<ListedTask>> failed_tasks(Journal& journal, const JobId& job)
 
 }  // namespace
 
-Status Service::receive(const PeerId& peer, const ListJobs& message) {
+Status Questions::answer(const PeerId& peer, const ListJobs& message) {
   const IdentityBook& known = farm_.history.jobs();
   const Answers answers(farm_);
   JobList list = answers.list_workers();
@@ -76,7 +78,7 @@ Status Service::receive(const PeerId& peer, const ListJobs& message) {
   return farm_.reply(peer, std::move(list));
 }
 
-Status Service::receive(const PeerId& peer, const ListEvents& message) {
+Status Questions::answer(const PeerId& peer, const ListEvents& message) {
   EventQuery query = message.query;
   query.count = std::clamp(query.count, 1, limits::kMaxEventsTold);
   if (!message.job.empty()) {
@@ -99,19 +101,19 @@ Status Service::receive(const PeerId& peer, const ListEvents& message) {
   return farm_.reply(peer, std::move(list));
 }
 
-Result<Digest> Service::resolve(const std::string& text) {
+Result<Digest> Questions::resolve(const std::string& text) {
   BATON_ASSIGN(const std::vector<FoundJob> found,
                text.empty() ? std::vector<FoundJob>() : farm_.journal.find_jobs(text));
   return choose_job(found, text);
 }
 
-Status Service::receive(const PeerId& peer, const ShowJob& message) {
+Status Questions::answer(const PeerId& peer, const ShowJob& message) {
   const Result<Digest> job = resolve(message.job);
   if (job) return answer_detail(peer, *job);
   return farm_.refuse(peer, job.error());
 }
 
-Status Service::receive(const PeerId& peer, const AskWhy& message) {
+Status Questions::answer(const PeerId& peer, const AskWhy& message) {
   const Answers answers(farm_);
   Result<ReasonChain> chain = ReasonChain();
   if (message.job.empty()) {
@@ -128,7 +130,7 @@ Status Service::receive(const PeerId& peer, const AskWhy& message) {
   return farm_.reply(peer, std::move(chain).value());
 }
 
-Status Service::receive(const PeerId& peer, const ListTasks& message) {
+Status Questions::answer(const PeerId& peer, const ListTasks& message) {
   std::vector<Digest> jobs = farm_.scheduler.jobs();
   if (!message.job.empty()) {
     const Result<Digest> job = resolve(message.job);
@@ -146,8 +148,26 @@ Status Service::receive(const PeerId& peer, const ListTasks& message) {
   return farm_.reply(peer, std::move(list));
 }
 
-/// Describes a job that is known here or in the archive.
-Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
+Status Questions::answer(const PeerId& peer, const AskPicture& message) {
+  const Result<Digest> job = resolve(message.job);
+  if (!job) return farm_.refuse(peer, job.error());
+  Result<PictureSource> source = Error{ErrorKind::internal, {}};
+  if (const Scheduler::Job* const known = farm_.scheduler.find_job(*job)) {
+    source = find_picture(known->spec, known->tasks, message);
+  } else {
+    BATON_ASSIGN(const std::optional<JobDetail> ended, farm_.archived_detail(*job));
+    BATON_ASSIGN(const SharedDocument document, journalled_document(farm_.journal, *job));
+    if (!document->parsed) return farm_.refuse(peer, document->parsed.error());
+    source = find_written_picture(document->parsed->job,
+                                  ended ? ended->frames_done : std::vector<FrameNumber>(), message);
+  }
+  if (!source) return farm_.refuse(peer, source.error());
+  source->identity = farm_.history.jobs().of(*job);
+  source->store_directory = farm_.store_directory.string();
+  return farm_.reply(peer, std::move(source).value());
+}
+
+Status Questions::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
   BATON_ASSIGN(JobGrowth growth, farm_.journal.growth(farm_.history.jobs().of(job).id));
   if (farm_.scheduler.find_job(job) != nullptr) {
     ShownJob shown{farm_.history.jobs().of(job), {}};

@@ -1,0 +1,226 @@
+#include <gmock/gmock.h>
+
+#include "tests/unit/service/fake_farm.h"
+
+/// Frames that are rendered once more because somebody wants it, and where a job's frames are seen.
+namespace baton::testing_service {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+struct RequeueTest : ServiceTest {
+  RequeuePlan plan(const std::string& endpoint, std::vector<FrameNumber> frames) {
+    return ask<RequeuePlan>(endpoint, AskRequeue{"test", std::move(frames)});
+  }
+  JobAccepted submit(const std::string& endpoint, std::vector<FrameNumber> again = {}) {
+    return ask<JobAccepted>(endpoint, SubmitJob{document, false, true, std::move(again)});
+  }
+  /// Does tasks until the job has ended; returns how many there were.
+  int finish(const std::string& endpoint, FakeWorker& worker, const Digest& id) {
+    int count = 0;
+    while (show(endpoint, id).summary.tasks_done < kNumTasks) {
+      worker.do_one_task();
+      ++count;
+    }
+    EXPECT_EQ(show_end(endpoint, id).summary.status, JobStatus::done);
+    return count;
+  }
+  std::vector<FarmEvent> requeues(const std::string& endpoint) {
+    return ask<EventList>(endpoint,
+                          ListEvents{"test", {.kinds = bit_of(FarmEventKind::frames_requeued)}})
+        .events;
+  }
+};
+
+// Frames 1-2 and 3-4 are runs of two tiles, and states of the first are not kept. What is promised
+// is what is done.
+TEST_F(RequeueTest, ADoneJobRendersFramesAgain) {
+  Digest id;
+  {
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    id = submit(service.endpoint()).version;
+    EXPECT_EQ(finish(service.endpoint(), worker, id), kNumTasks);
+  }
+  // In the archive it is another coordinator's, too.
+  const RunningService service(options);
+  const std::string& endpoint = service.endpoint();
+  const RequeuePlan second = plan(endpoint, {FrameNumber(3)});
+  EXPECT_THAT(second.plan, HasSubstr("frame 3 is rendered again, from the first frame on"));
+  EXPECT_THAT(second.plan,
+              HasSubstr("frames 1-2,4 are rendered once more with them, and not written"));
+  EXPECT_EQ(show(endpoint, id).summary.status, JobStatus::done) << "it was only asked";
+  EXPECT_THAT(requeues(endpoint), IsEmpty());
+
+  FakeWorker worker(endpoint, store(), job);
+  worker.hello();
+  submit(endpoint, {FrameNumber(3)});
+  EXPECT_EQ(show(endpoint, id).summary.status, JobStatus::running);
+  EXPECT_EQ(show(endpoint, id).frames_done.size(), 3u);
+  EXPECT_EQ(finish(endpoint, worker, id), static_cast<int>(second.num_tasks));
+  ASSERT_THAT(requeues(endpoint), SizeIs(1));
+  EXPECT_EQ(requeues(endpoint)[0].reason, "frames 3");
+
+  // All of them: from the first one on.
+  const std::vector<FrameNumber> all{FrameNumber(1), FrameNumber(2), FrameNumber(3),
+                                     FrameNumber(4)};
+  EXPECT_THAT(plan(endpoint, all).plan, HasSubstr("1-4 are rendered again, from the first frame"));
+  EXPECT_EQ(plan(endpoint, all).num_tasks, static_cast<std::uint64_t>(kNumTasks));
+  submit(endpoint, all);
+  EXPECT_EQ(finish(endpoint, worker, id), kNumTasks);
+}
+
+TEST_F(RequeueTest, AnOpenJobDoesTheSameAndAPausedOneStaysPaused) {
+  const RunningService service(options);
+  const std::string& endpoint = service.endpoint();
+  FakeWorker worker(endpoint, store(), job);
+  worker.hello();
+  const Digest id = submit(endpoint).version;
+  EXPECT_EQ(plan(endpoint, {FrameNumber(1)}).num_tasks, 0u) << "nothing is done";
+  EXPECT_THAT(plan(endpoint, {FrameNumber(1)}).plan, HasSubstr("frame 1 is not written yet"));
+  while (show(endpoint, id).frames_done.size() < 2) worker.do_one_task();
+  const std::uint64_t done = show(endpoint, id).summary.tasks_done;
+  const RequeuePlan wanted = plan(endpoint, {FrameNumber(2)});
+  EXPECT_THAT(wanted.plan, HasSubstr("frame 2 is rendered again, from the first frame on"));
+  ask<ShownJob>(endpoint, PauseJob{"test"});
+  submit(endpoint, {FrameNumber(2)});
+  EXPECT_EQ(show(endpoint, id).summary.status, JobStatus::paused);
+  EXPECT_EQ(show(endpoint, id).summary.tasks_done, done - wanted.num_tasks);
+  ask<ShownJob>(endpoint, ResumeJob{"test"});
+  finish(endpoint, worker, id);
+}
+
+// What is in work for these frames was made of what is not wanted: its result counts for nothing.
+TEST_F(RequeueTest, WhatIsInWorkIsTakenBack) {
+  const RunningService service(options);
+  const std::string& endpoint = service.endpoint();
+  FakeWorker worker(endpoint, store(), job);
+  worker.hello();
+  const Digest id = submit(endpoint).version;
+  LeaseId lease;
+  for (;;) {
+    worker.say(LeaseRequest{1});
+    lease = worker.expect<LeaseGrant>().lease;
+    if (lease.task.kind == TaskKind::assemble) break;
+    worker.say(worker.work(lease));
+  }
+  const TaskDone late = worker.work(lease);
+  submit(endpoint, {FrameNumber(1), FrameNumber(2)});
+  EXPECT_EQ(worker.expect<LeaseRevoke>().lease, lease);
+  worker.say(late);
+  worker.expect<ReportReceived>();
+  EXPECT_TRUE(show(endpoint, id).frames_done.empty());
+  finish(endpoint, worker, id);
+  for (const FarmEvent& event : ask<EventList>(endpoint, ListEvents{"test"}).events)
+    EXPECT_NE(event.kind, FarmEventKind::task_lost) << event.reason;
+}
+
+// Nobody has changed the frame while it was locked: it is the job's again, and rendered.
+TEST_F(RequeueTest, AFrameThatWasLockedMeanwhileIsTheJobsAgain) {
+  for (const bool has_ended : {false, true}) {
+    const RunningService service(options);
+    const std::string& endpoint = service.endpoint();
+    FakeWorker worker(endpoint, store(), job);
+    worker.hello();
+    const Digest id = submit(endpoint).version;
+    finish(endpoint, worker, id);
+    submit(endpoint, {FrameNumber(3)});
+    ask<ShownJob>(endpoint, LockFrames{"test", {FrameNumber(3)}});
+    if (has_ended) finish(endpoint, worker, id);
+    ask<ShownJob>(endpoint, LockFrames{"test", {FrameNumber(3)}, /*off=*/true});
+    finish(endpoint, worker, id);
+  }
+}
+
+// A job that has ended before its end goes on with all that is left, and says so.
+TEST_F(RequeueTest, ACancelledJobSaysThatItGoesOn) {
+  const RunningService service(options);
+  const std::string& endpoint = service.endpoint();
+  FakeWorker worker(endpoint, store(), job);
+  worker.hello();
+  const Digest id = submit(endpoint).version;
+  while (show(endpoint, id).frames_done.size() < 2) worker.do_one_task();
+  ask<ShownJob>(endpoint, CancelJob{"test"});
+  const RequeuePlan wanted = plan(endpoint, {FrameNumber(1)});
+  EXPECT_THAT(wanted.plan,
+              HasSubstr("frames 3-4 are rendered, too: the job is cancelled and goes on"));
+  submit(endpoint, {FrameNumber(1)});
+  EXPECT_EQ(finish(endpoint, worker, id), static_cast<int>(wanted.num_tasks));
+}
+
+TEST_F(RequeueTest, LockedAndUnknownFramesAreRefused) {
+  const RunningService service(options);
+  const std::string& endpoint = service.endpoint();
+  FakeWorker worker(endpoint, store(), job);
+  worker.hello();
+  const Digest id = submit(endpoint).version;
+  finish(endpoint, worker, id);
+  ask<ShownJob>(endpoint, LockFrames{"test", {FrameNumber(2)}});
+  for (const Message& question :
+       {Message(AskRequeue{"test", {FrameNumber(2), FrameNumber(3)}}),
+        Message(SubmitJob{document, false, true, {FrameNumber(2), FrameNumber(3)}})}) {
+    EXPECT_THAT(refused(endpoint, question).message, HasSubstr("frame 2 is locked"));
+  }
+  for (const Message& question : {Message(AskRequeue{"test", {FrameNumber(9)}}),
+                                  Message(SubmitJob{document, false, true, {FrameNumber(9)}})}) {
+    EXPECT_THAT(refused(endpoint, question).message,
+                HasSubstr("no frames 9, expected some of 1-4"));
+  }
+  EXPECT_EQ(show(endpoint, id).summary.status, JobStatus::done);
+}
+
+TEST_F(RequeueTest, APictureIsTheLastFrameOrTheTilesOfOneInWork) {
+  const RunningService service(options);
+  const std::string& endpoint = service.endpoint();
+  FakeWorker worker(endpoint, store(), job);
+  worker.hello();
+  const Digest id = submit(endpoint).version;
+  const AskPicture last{"test"}, partial{"test", false, FrameNumber(0), true};
+  EXPECT_THAT(refused(endpoint, last).message, HasSubstr("no frame is written yet"));
+  EXPECT_THAT(refused(endpoint, partial).message, HasSubstr("no tile of frame 1 is finished yet"));
+  EXPECT_THAT(refused(endpoint, AskPicture{"test", true, FrameNumber(9)}).message,
+              HasSubstr("no frame 9, expected one of 1-4"));
+
+  worker.do_one_task();
+  const auto tiles = ask<PictureSource>(endpoint, partial);
+  EXPECT_EQ(tiles.frame, FrameNumber(1));
+  EXPECT_FALSE(tiles.is_written);
+  EXPECT_EQ(tiles.num_tiles, 2);
+  ASSERT_THAT(tiles.films, SizeIs(1));
+  EXPECT_TRUE(BlobStore::open(tiles.store_directory)->contains(tiles.films[0].digest));
+  EXPECT_THAT(refused(endpoint, last).message, HasSubstr("no frame is written yet"));
+
+  while (show(endpoint, id).frames_done.size() < 2) worker.do_one_task();
+  EXPECT_EQ(ask<PictureSource>(endpoint, last).frame, FrameNumber(2));
+  EXPECT_EQ(ask<PictureSource>(endpoint, AskPicture{"test", true, FrameNumber(1)}).file,
+            frame_path(job, FrameIndex(0)).string());
+  finish(endpoint, worker, id);
+  for (const AskPicture& question : {last, partial}) {
+    const auto written = ask<PictureSource>(endpoint, question);
+    EXPECT_TRUE(written.is_written);
+    EXPECT_EQ(written.frame, FrameNumber(4));
+  }
+}
+
+// When a job will be done is known as soon as the coordinator is back.
+TEST_F(RequeueTest, EtasOutlastTheCoordinator) {
+  Digest id;
+  {
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    id = submit(service.endpoint()).version;
+    while (show(service.endpoint(), id).summary.tasks_done < kNumTasks - 1) worker.do_one_task();
+  }
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  EXPECT_TRUE(ask<ShownJob>(service.endpoint(), ShowJob{id.hex()}).now.eta.is_known());
+}
+
+}  // namespace
+}  // namespace baton::testing_service
