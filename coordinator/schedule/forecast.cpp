@@ -15,7 +15,7 @@ namespace {
 /// are fewer draws, which then differ less.
 constexpr std::size_t kMostDraws = 15, kLeastDraws = 5, kMostTasks = 200'000;
 /// What is left is longer than what error_so_far() looked ahead, and goes farther off.
-constexpr double kFartherOff = 1.95;
+constexpr double kFartherOff = 2.3;
 /// What the model itself leaves out: other work on the machines, scenes that change.
 constexpr double kUnknown = 0.01;
 
@@ -68,7 +68,14 @@ class Play {
  public:
   Play(const std::vector<Played>& jobs, int num_threads, double growth, double pace,
        std::uint64_t seed)
-      : jobs_(jobs), free_(num_threads), growth_(growth), pace_(pace), random_(seed) {}
+      : jobs_(jobs), free_(num_threads), growth_(growth), pace_(pace), random_(seed) {
+    for (const Played& played : jobs_) {
+      std::vector<double>& levels = levels_.emplace_back();
+      for (std::int32_t tile = 0; tile < played.job.graph.num_tiles(); ++tile)
+        levels.push_back(
+            std::exp(played.job.times.level_error(TaskKind::render, tile) * normal_(random_)));
+    }
+  }
 
   /// When each job ends.
   std::vector<double> run() {
@@ -96,8 +103,12 @@ class Play {
  private:
   double draw(std::size_t j, TaskIndex task) {
     const ForecastJob& job = jobs_[j].job;
-    const double spread = job.times.spread(job.graph.key(task).kind);
-    const double mean = std::exp(uncertainty(job) * pace_) * expected_seconds(job, task, growth_);
+    const TaskKey key = job.graph.key(task);
+    const double spread = job.times.spread(key.kind);
+    const double level =
+        key.kind == TaskKind::render ? levels_[j][static_cast<std::size_t>(key.tile)] : 1;
+    const double mean =
+        level * std::exp(uncertainty(job) * pace_) * expected_seconds(job, task, growth_);
     return mean * std::exp(spread * normal_(random_) - 0.5 * spread * spread);
   }
   void begin(std::size_t job, TaskIndex task, double seconds) {
@@ -125,6 +136,7 @@ class Play {
   }
 
   std::vector<Played> jobs_;
+  std::vector<std::vector<double>> levels_;  ///< of the tiles of each job, as factors
   int free_;
   const double growth_, pace_;
   std::mt19937_64 random_;

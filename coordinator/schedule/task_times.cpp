@@ -32,11 +32,14 @@ void TaskTimes::add(const Done& task) {
   std::deque<Seen>& seen = kind.tiles[tile];
   // What was made by the way counts only until there is another time.
   if (task.is_first && !seen.empty()) return;
-  std::erase_if(seen, [](const Seen& s) { return s.is_first; });
+  const double log_seconds = std::log(std::max(task.seconds, kLeastSeconds) / task.steps.size());
+  if (!seen.empty() && seen.front().is_first) {
+    kind.firsts_longer += seen.front().log_seconds - log_seconds;
+    ++kind.num_firsts;
+    seen.pop_front();
+  }
   if (seen.size() >= kNewest) seen.pop_front();
-  seen.push_back({middle(task.steps),
-                  std::log(std::max(task.seconds, kLeastSeconds) / task.steps.size()),
-                  task.is_first});
+  seen.push_back({middle(task.steps), log_seconds, task.is_first});
   ++kind.count;
   kind.growth.reset();
   kind.error_so_far.reset();
@@ -103,12 +106,14 @@ double TaskTimes::seconds_of_step(const Kind& kind, std::size_t tile, double pla
   const auto carried = [&](double distance) {
     return most > 0 ? slope * most * (1 - std::exp(-distance / most)) : 0;
   };
+  const double first_longer =
+      kind.num_firsts > 0 ? kind.firsts_longer / static_cast<double>(kind.num_firsts) : 0;
   const auto level_of = [&](const std::deque<Seen>& seen) {
     const std::size_t from =
         std::max(first_that_counts(seen), seen.size() - std::min(seen.size(), kLevel));
     double level = 0;
     for (std::size_t i = from; i < seen.size(); ++i)
-      level += seen[i].log_seconds +
+      level += seen[i].log_seconds - (seen[i].is_first ? first_longer : 0) +
                std::clamp(carried(place - seen[i].place), -kMostGrowth, kMostGrowth);
     return level / static_cast<double>(seen.size() - from);
   };
@@ -133,6 +138,14 @@ std::optional<double> TaskTimes::expected(TaskKind which, std::int32_t tile, con
          seconds_of_step(kind, static_cast<std::size_t>(tile), middle(steps), deviations);
 }
 
+double TaskTimes::level_error(TaskKind which, std::int32_t tile) const {
+  const Kind& kind = kinds_[static_cast<std::size_t>(which)];
+  const auto place = static_cast<std::size_t>(tile);
+  const std::size_t num = place < kind.tiles.size() ? kind.tiles[place].size() : 0;
+  return growth_of(kind).spread /
+         std::sqrt(static_cast<double>(std::clamp<std::size_t>(num, 1, kLevel)));
+}
+
 double TaskTimes::spread(TaskKind kind) const {
   return growth_of(kinds_[static_cast<std::size_t>(kind)]).spread;
 }
@@ -151,26 +164,35 @@ double TaskTimes::error_so_far(TaskKind which) const {
     const double cut = first + share * (last - first);
     Kind before;
     before.tiles.resize(kind.tiles.size());
+    before.firsts_longer = kind.firsts_longer;
+    before.num_firsts = kind.num_firsts;
     for (std::size_t tile = 0; tile < kind.tiles.size(); ++tile) {
       for (const Seen& seen : kind.tiles[tile]) {
         if (seen.place <= cut) before.tiles[tile].push_back(seen);
       }
       before.count += before.tiles[tile].size();
     }
-    double came = 0, was_expected = 0;
+    double came = 0, was_expected = 0, chance = 0;
     for (std::size_t tile = 0; tile < kind.tiles.size(); ++tile) {
+      double of_tile = 0, num_after = 0;
       for (const Seen& seen : kind.tiles[tile]) {
         if (seen.place <= cut || before.tiles[tile].empty()) continue;
-        came += std::exp(seen.log_seconds);
+        of_tile += std::exp(seen.log_seconds);
         was_expected += seconds_of_step(before, tile, seen.place, 0);
+        ++num_after;
       }
+      if (num_after == 0) continue;
+      came += of_tile;
+      const auto num_before = static_cast<double>(std::min(before.tiles[tile].size(), kLevel));
+      chance += of_tile * of_tile * (1 / num_before + 1 / num_after);
     }
     if (came == 0) continue;
     const double off = std::log(came / was_expected);
-    square += off * off;
+    const double spread = growth_of(before).spread;
+    square += off * off - spread * spread * chance / (came * came);
     ++num;
   }
-  kind.error_so_far = num > 0 ? std::sqrt(square / num) : 0;
+  kind.error_so_far = num > 0 ? std::sqrt(std::max(square, 0.0) / num) : 0;
   return *kind.error_so_far;
 }
 

@@ -33,10 +33,14 @@ class TaskTimes {
   /// growth, whose own error is the only one that all tasks of a job share.
   std::optional<double> expected(TaskKind kind, std::int32_t tile, const StepSpan& steps,
                                  double deviations = 0) const;
+  /// The standard deviation of the logarithm of what a tile takes, which all of its tasks share: it
+  /// is known from few of them.
+  double level_error(TaskKind kind, std::int32_t tile) const;
   /// The standard deviation of the logarithm of a task's seconds about what is expected.
   double spread(TaskKind kind) const;
   /// How far off this would have been: of what is done, the later part as expected from the earlier
-  /// one, as the root mean square of the logarithm of both sums, at several places of the cut.
+  /// one, as the root mean square of the logarithm of both sums, at several places of the cut; less
+  /// what is chance of single tiles.
   double error_so_far(TaskKind kind) const;
 
  private:
@@ -54,6 +58,9 @@ class TaskTimes {
   struct Kind {
     std::vector<std::deque<Seen>> tiles;  ///< seconds of one step
     std::size_t count = 0;
+    /// How much longer than the next of its tile the first task of one took: logarithms, in all.
+    double firsts_longer = 0;
+    std::size_t num_firsts = 0;
     mutable std::optional<Growth> growth = {};  ///< once somebody asks
     mutable std::optional<double> error_so_far = {};
   };
