@@ -37,10 +37,10 @@ def names_steer_no_terminal(programs, folder):
         told = getattr(programs.run("baton", *words, expect=expect), stream)
         check("\\x1b[31mred\\u202egpj" in told and "\x1b" not in told and "\u202e" not in told, repr(told))
     check(frame.with_suffix(".png").exists(), "the picture")
-    for program in ("baton", "baton-coordinator", "baton-worker"):
-        for words in (["config"], []) if program == "baton" else ([],):
-            told = programs.run(program, *words, "\x1b[31mred\u202egpj", expect=USAGE).stderr
-            check("\\x1b[31mred\\u202egpj" in told and "\x1b" not in told, repr(told))
+    for program, *words in (["baton"], ["baton", "config"], ["baton-coordinator", "--work-dir", folder],
+                            ["baton-worker", "--coordinator", "tcp://127.0.0.1:1"]):
+        told = programs.run(program, *words, "\x1b[31mred\u202egpj", expect=USAGE).stderr
+        check("\\x1b[31mred\\u202egpj" in told and "\x1b" not in told, repr(told))
 
 
 def grey_map(path, width, height):
