@@ -28,14 +28,15 @@ Status expect_folder(const std::filesystem::path& folder) {
   while (!exists(std::filesystem::symlink_status(there, error)) && there.has_relative_path())
     there = there.parent_path();
   std::string fault = " is no folder";
+  const char* what = "made";
   if (is_directory(std::filesystem::status(there, error))) {
     if (::access(there.c_str(), W_OK | X_OK) == 0 || (errno != EROFS && errno != EACCES)) return {};
     error = {errno, std::generic_category()};
+    if (there == folder) what = "written";
   }
   if (error) fault = ": " + error.message();
-  return Error{ErrorKind::io,
-               fmt::format("{}: the output folder cannot be {}: {}{}", folder.string(),
-                           there == folder ? "written" : "made", there.string(), fault)};
+  return Error{ErrorKind::io, fmt::format("{}: the output folder cannot be {}: {}{}",
+                                          folder.string(), what, there.string(), fault)};
 }
 
 /// Error, usage: a user's key has no right to write into the folder: it lies in one that a job of
