@@ -53,22 +53,6 @@ std::vector<Digest> Scheduler::in_turn() const {
   return result;
 }
 
-std::size_t num_ready(const Scheduler& scheduler) {
-  std::size_t count = 0;
-  for (const Digest& job : scheduler.in_turn())
-    count += scheduler.find_job(job)->tasks.book().ready().size();
-  return count;
-}
-
-double longest_task_seconds(const Scheduler& scheduler) {
-  double longest = 0;
-  for (const Digest& job : scheduler.in_turn()) {
-    const auto render = static_cast<std::size_t>(TaskKind::render);
-    longest = std::max(longest, scheduler.find_job(job)->longest_seconds.at(render));
-  }
-  return longest;
-}
-
 TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt) {
   return place_of(job.spec, job.tasks.graph().timeline(), task, attempt);
 }

@@ -79,6 +79,22 @@ void Scheduler::on(const ClockTicked&, TimePoint now, Actions& actions) {
   }
 }
 
+std::size_t num_ready(const Scheduler& scheduler) {
+  std::size_t count = 0;
+  for (const Digest& job : scheduler.in_turn())
+    count += scheduler.find_job(job)->tasks.book().ready().size();
+  return count;
+}
+
+double longest_task_seconds(const Scheduler& scheduler) {
+  double longest = 0;
+  for (const Digest& job : scheduler.in_turn()) {
+    const auto render = static_cast<std::size_t>(TaskKind::render);
+    longest = std::max(longest, scheduler.find_job(job)->longest_seconds.at(render));
+  }
+  return longest;
+}
+
 // ---- leases -------------------------------------------------------------------------------------
 
 /// The task of a lease that the worker says it has. A lease that was lost, or granted by an earlier

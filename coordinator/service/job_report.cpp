@@ -119,17 +119,6 @@ std::vector<std::string> lost_reasons(const LostFiles& lost) {
   return reasons;
 }
 
-std::vector<BlobRef> find_lost_spares(const JobTasks& recorded, const BlobStore& store) {
-  std::vector<BlobRef> lost;
-  const JobGraph& graph = recorded.graph();
-  for (TaskIndex task = graph.num_frames(); task < graph.num_tasks(); ++task) {
-    for (const BlobRef& blob : recorded.ledger().spare_blobs(recorded.view(), task)) {
-      if (!blob.is_held() && !store.contains(blob.digest)) lost.push_back(blob);
-    }
-  }
-  return lost;
-}
-
 LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const FileTable& files,
                           const LockedFrames& locked, bool restart) {
   // What is recorded as done, and which blobs that leaves.
@@ -159,8 +148,10 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const Fil
     lose_if_gone(task, recorded.ledger().live_blobs(recorded.view(), task));
     if (recorded.ledger().is_cut(task))
       lose_if_gone(task, recorded.ledger().inputs(recorded.view(), task));
+    for (const BlobRef& blob : recorded.ledger().spare_blobs(recorded.view(), task)) {
+      if (!blob.is_held() && !store.contains(blob.digest)) lost.spares.push_back(blob);
+    }
   }
-  lost.spares = find_lost_spares(recorded, store);
   for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {
     if (recorded.book().status(frame) != TaskStatus::done) continue;
     ++lost.num_frames;

@@ -48,8 +48,6 @@ struct LostFiles {
     return num_frames > 0 && frames.empty() && num_unknown == 0 && num_strange == 0 && !unreadable;
   }
 };
-/// Blobs of what is recorded that nobody needs now (BlobLedger::spare_blobs) and that are gone.
-std::vector<BlobRef> find_lost_spares(const JobTasks& recorded, const BlobStore& store);
 /// restart: another picture in the place of a frame is lost, too, and a folder that is not there is
 /// an empty one.
 LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const FileTable& files,

@@ -7,28 +7,16 @@
 #include <set>
 
 #include "common/job/plan/sequence.h"
-#include "common/job/text/frame_range.h"
+#include "coordinator/service/locked_frames.h"
 
 namespace baton {
 namespace {
-
-/// nullopt: the job does not have the frame.
-std::optional<FrameIndex> place_in(const JobSpec& spec, FrameNumber frame) {
-  const auto found = std::ranges::find(spec.frames, frame);
-  if (found == spec.frames.end()) return std::nullopt;
-  return FrameIndex(static_cast<std::int32_t>(found - spec.frames.begin()));
-}
 
 /// What viewers show of a frame: of the image the part that is rendered.
 PixelRect seen_rect(const ImageSpec& image) {
   const PixelRect rect = image.rendered(), whole = image.whole();
   return {std::max(rect.x0, whole.x0), std::max(rect.y0, whole.y0), std::min(rect.x1, whole.x1),
           std::min(rect.y1, whole.y1)};
-}
-
-Error no_such_frame(const JobSpec& spec, FrameNumber frame) {
-  return {ErrorKind::bad_input, fmt::format("job '{}': it has no frame {}, expected one of {}",
-                                            spec.name, frame, format_frames(spec.frames))};
 }
 
 Error nothing_written(const JobSpec& spec, const AskPicture& question) {
@@ -79,9 +67,8 @@ Result<PictureSource> find_picture(const JobSpec& spec, const JobTasks& tasks,
   const FrameIndex end(tasks.graph().num_frames());
   FrameIndex frame{0};
   if (question.has_frame) {
-    const std::optional<FrameIndex> place = place_in(spec, question.frame);
-    if (!place) return no_such_frame(spec, question.frame);
-    frame = *place;
+    BATON_ASSIGN(const std::vector<FrameIndex> places, places_of(spec, {question.frame}));
+    frame = places.front();
   } else if (question.partial) {
     while (frame < end && is_written(frame)) ++frame;
     if (frame == end) frame = end - 1;
@@ -117,10 +104,9 @@ Result<PictureSource> find_written_picture(const JobSpec& spec,
                                            const AskPicture& question) {
   if (!question.has_frame && done.empty()) return nothing_written(spec, question);
   const FrameNumber wanted = question.has_frame ? question.frame : done.back();
-  const std::optional<FrameIndex> place = place_in(spec, wanted);
-  if (!place) return no_such_frame(spec, wanted);
+  BATON_ASSIGN(const std::vector<FrameIndex> places, places_of(spec, {wanted}));
   if (std::ranges::find(done, wanted) == done.end()) return nothing_written(spec, question);
-  return written_frame(spec, *place);
+  return written_frame(spec, places.front());
 }
 
 }  // namespace baton

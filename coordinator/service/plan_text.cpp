@@ -12,14 +12,6 @@
 namespace baton {
 namespace {
 
-std::string frames_text(const JobSpec& job, const std::vector<FrameIndex>& frames) {
-  std::vector<FrameNumber> numbers;
-  for (const FrameIndex frame : frames) numbers.push_back(job.frames[frame.index()]);
-  return fmt::format("{} {}", numbers.size() == 1 ? "frame" : "frames", format_frames(numbers));
-}
-
-const char* are(const std::vector<FrameIndex>& frames) { return frames.size() == 1 ? "is" : "are"; }
-
 /// What the render tasks that are open have before them.
 struct OpenRuns {
   std::set<Run> runs;
@@ -44,6 +36,13 @@ OpenRuns find_open_runs(const JobTasks& tasks) {
 
 }  // namespace
 
+std::string frames_text(const JobSpec& job, const std::set<FrameIndex>& frames) {
+  std::vector<FrameNumber> numbers;
+  for (const FrameIndex frame : frames) numbers.push_back(job.frames[frame.index()]);
+  std::ranges::sort(numbers);
+  return fmt::format("{} {}", numbers.size() == 1 ? "frame" : "frames", format_frames(numbers));
+}
+
 std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>& reasons) {
   const JobGraph& graph = job.tasks.graph();
   const JobSpec& spec = job.spec;
@@ -51,21 +50,19 @@ std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>&
   const auto is_written = [&](FrameIndex frame) {
     return job.tasks.book().status(*graph.find(assemble_task(frame))) == TaskStatus::done;
   };
-  std::vector<FrameIndex> kept, left;
+  std::set<FrameIndex> kept, left, again;
   for (FrameIndex frame{0}; frame < FrameIndex(graph.num_frames()); ++frame)
-    (is_written(frame) ? kept : left).push_back(frame);
+    (is_written(frame) ? kept : left).insert(frame);
   const OpenRuns open = find_open_runs(job.tasks);
   const bool some_work = kept.size() + left.size() > 0 && job.tasks.book().counts().done > 0;
   if (kept.empty() && reasons.empty() && !some_work) return {};
-  std::set<FrameIndex> written_again;
   for (const Run run : open.runs) {
     const StepSpan steps = timeline.steps_of(run);
     for (Step step = steps.first; step <= steps.last; ++step) {
       const FrameIndex frame = timeline.frame_of(step);
-      if (is_written(frame)) written_again.insert(frame);
+      if (is_written(frame)) again.insert(frame);
     }
   }
-  const std::vector<FrameIndex> again(written_again.begin(), written_again.end());
 
   std::string text;
   if (!kept.empty()) text += fmt::format("{} {} kept\n", frames_text(spec, kept), are(kept));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -7,6 +8,12 @@
 #include "coordinator/schedule/scheduler.h"
 
 namespace baton {
+
+/// "frame 3", "frames 1-4", and what follows: "is" or "are".
+std::string frames_text(const JobSpec& job, const std::set<FrameIndex>& frames);
+inline const char* are(const std::set<FrameIndex>& frames) {
+  return frames.size() == 1 ? "is" : "are";
+}
 
 /// What is kept of a job and what is rendered, for people, a line each: "frames 1-8 are kept",
 /// "frames 9-12 are rendered, going on from the states of frame 8". Then `reasons`, why something

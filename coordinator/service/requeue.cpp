@@ -4,20 +4,11 @@
 
 #include <algorithm>
 
-#include "common/job/text/frame_range.h"
 #include "coordinator/schedule/job_tasks.h"
-#include "coordinator/service/job_report.h"
+#include "coordinator/service/plan_text.h"
 
 namespace baton {
 namespace {
-
-std::string frames_text(const JobSpec& spec, const std::set<FrameIndex>& frames) {
-  std::vector<FrameNumber> numbers;
-  for (const FrameIndex frame : frames) numbers.push_back(spec.frames[frame.index()]);
-  std::ranges::sort(numbers);
-  return fmt::format("{} {}", numbers.size() == 1 ? "frame" : "frames", format_frames(numbers));
-}
-const char* are(const std::set<FrameIndex>& frames) { return frames.size() == 1 ? "is" : "are"; }
 
 /// Pixels of a render task, in all its steps.
 std::uint64_t pixels_of(const JobGraph& graph, const TaskKey& task) {

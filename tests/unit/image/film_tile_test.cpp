@@ -32,6 +32,26 @@ std::string meta_error(std::size_t index, std::int32_t value) {
   return decoded ? "" : decoded.error().message;
 }
 
+TEST(FilmTile, ATileThatDoesNotBelongIsNotPasted) {
+  const auto tile = [](const PixelRect& rect, std::vector<std::string> channels) {
+    FilmTile made = blank_image(rect, std::move(channels));
+    made.values.assign(made.values.size(), 1);
+    return made;
+  };
+  FilmTile image = blank_image({0, 0, 4, 3}, {"R", "G"});
+  EXPECT_TRUE(paste_tile(tile({1, 1, 3, 2}, {"R", "G"}), image).ok());
+  const std::vector<float> one{0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0};
+  EXPECT_EQ(std::vector<float>(image.plane(0), image.plane(1)), one);
+  EXPECT_EQ(std::vector<float>(image.plane(1), image.plane(1) + 12), one);
+  const FilmTile before = image;
+  EXPECT_FALSE(paste_tile(tile({3, 0, 5, 2}, {"R", "G"}), image).ok());
+  EXPECT_FALSE(paste_tile(tile({-1, 0, 2, 2}, {"R", "G"}), image).ok());
+  const Status status = paste_tile(tile({0, 0, 2, 2}, {"R", "A"}), image);
+  ASSERT_FALSE(status.ok());
+  EXPECT_THAT(status.error().message, HasSubstr("expected R G"));
+  EXPECT_EQ(image, before);
+}
+
 TEST(FilmTile, GivesBackTheSameBits) {
   const FilmTile tile = small_tile();
   const Bytes bytes = encode_film_tile(tile, kOrigin);

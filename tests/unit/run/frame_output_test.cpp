@@ -55,17 +55,6 @@ TEST(FrameOutput, TilesMakeTheWholePicture) {
   EXPECT_EQ(assembled(job), make_tile({0, 0, 20, 10}));
 }
 
-TEST(FrameOutput, ATileThatDoesNotBelongIsAnError) {
-  FilmTile image = blank_image(small_job("alien").image.rendered(), {"R", "G", "B"});
-  EXPECT_FALSE(paste_tile(make_tile({16, 0, 24, 8}), image));
-  EXPECT_FALSE(paste_tile(make_tile({-1, 0, 4, 4}), image));
-  FilmTile other_channels = make_tile({0, 0, 8, 8});
-  other_channels.channels[2] = "A";
-  const Status status = paste_tile(other_channels, image);
-  ASSERT_FALSE(status);
-  EXPECT_THAT(status.error().message, testing::HasSubstr("expected R G B"));
-}
-
 TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
   JobSpec job = small_job("written");
   job.metadata["owner"] = "lighting";

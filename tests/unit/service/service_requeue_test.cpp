@@ -27,6 +27,20 @@ struct RequeueTest : ServiceTest {
     EXPECT_EQ(show_end(endpoint, id).summary.status, JobStatus::done);
     return count;
   }
+  /// A coordinator that has the job, and a worker.
+  struct Busy {
+    explicit Busy(RequeueTest& test)
+        : service(test.options),
+          endpoint(service.endpoint()),
+          worker(endpoint, test.store(), test.job) {
+      worker.hello();
+      id = test.submit(endpoint).version;
+    }
+    RunningService service;
+    const std::string& endpoint;
+    FakeWorker worker;
+    Digest id;
+  };
   std::vector<FarmEvent> requeues(const std::string& endpoint) {
     return ask<EventList>(endpoint,
                           ListEvents{"test", {.kinds = bit_of(FarmEventKind::frames_requeued)}})
@@ -74,11 +88,8 @@ TEST_F(RequeueTest, ADoneJobRendersFramesAgain) {
 }
 
 TEST_F(RequeueTest, AnOpenJobDoesTheSameAndAPausedOneStaysPaused) {
-  const RunningService service(options);
-  const std::string& endpoint = service.endpoint();
-  FakeWorker worker(endpoint, store(), job);
-  worker.hello();
-  const Digest id = submit(endpoint).version;
+  Busy farm(*this);
+  auto& [service, endpoint, worker, id] = farm;
   EXPECT_EQ(plan(endpoint, {FrameNumber(1)}).num_tasks, 0u) << "nothing is done";
   EXPECT_THAT(plan(endpoint, {FrameNumber(1)}).plan, HasSubstr("frame 1 is not written yet"));
   while (show(endpoint, id).frames_done.size() < 2) worker.do_one_task();
@@ -95,11 +106,8 @@ TEST_F(RequeueTest, AnOpenJobDoesTheSameAndAPausedOneStaysPaused) {
 
 // What is in work for these frames was made of what is not wanted: its result counts for nothing.
 TEST_F(RequeueTest, WhatIsInWorkIsTakenBack) {
-  const RunningService service(options);
-  const std::string& endpoint = service.endpoint();
-  FakeWorker worker(endpoint, store(), job);
-  worker.hello();
-  const Digest id = submit(endpoint).version;
+  Busy farm(*this);
+  auto& [service, endpoint, worker, id] = farm;
   LeaseId lease;
   for (;;) {
     worker.say(LeaseRequest{1});
@@ -121,11 +129,8 @@ TEST_F(RequeueTest, WhatIsInWorkIsTakenBack) {
 // Nobody has changed the frame while it was locked: it is the job's again, and rendered.
 TEST_F(RequeueTest, AFrameThatWasLockedMeanwhileIsTheJobsAgain) {
   for (const bool has_ended : {false, true}) {
-    const RunningService service(options);
-    const std::string& endpoint = service.endpoint();
-    FakeWorker worker(endpoint, store(), job);
-    worker.hello();
-    const Digest id = submit(endpoint).version;
+    Busy farm(*this);
+    auto& [service, endpoint, worker, id] = farm;
     finish(endpoint, worker, id);
     submit(endpoint, {FrameNumber(3)});
     ask<ShownJob>(endpoint, LockFrames{"test", {FrameNumber(3)}});
@@ -137,11 +142,8 @@ TEST_F(RequeueTest, AFrameThatWasLockedMeanwhileIsTheJobsAgain) {
 
 // A job that has ended before its end goes on with all that is left, and says so.
 TEST_F(RequeueTest, ACancelledJobSaysThatItGoesOn) {
-  const RunningService service(options);
-  const std::string& endpoint = service.endpoint();
-  FakeWorker worker(endpoint, store(), job);
-  worker.hello();
-  const Digest id = submit(endpoint).version;
+  Busy farm(*this);
+  auto& [service, endpoint, worker, id] = farm;
   while (show(endpoint, id).frames_done.size() < 2) worker.do_one_task();
   ask<ShownJob>(endpoint, CancelJob{"test"});
   const RequeuePlan wanted = plan(endpoint, {FrameNumber(1)});
@@ -152,11 +154,8 @@ TEST_F(RequeueTest, ACancelledJobSaysThatItGoesOn) {
 }
 
 TEST_F(RequeueTest, LockedAndUnknownFramesAreRefused) {
-  const RunningService service(options);
-  const std::string& endpoint = service.endpoint();
-  FakeWorker worker(endpoint, store(), job);
-  worker.hello();
-  const Digest id = submit(endpoint).version;
+  Busy farm(*this);
+  auto& [service, endpoint, worker, id] = farm;
   finish(endpoint, worker, id);
   ask<ShownJob>(endpoint, LockFrames{"test", {FrameNumber(2)}});
   for (const Message& question :
@@ -173,16 +172,13 @@ TEST_F(RequeueTest, LockedAndUnknownFramesAreRefused) {
 }
 
 TEST_F(RequeueTest, APictureIsTheLastFrameOrTheTilesOfOneInWork) {
-  const RunningService service(options);
-  const std::string& endpoint = service.endpoint();
-  FakeWorker worker(endpoint, store(), job);
-  worker.hello();
-  const Digest id = submit(endpoint).version;
+  Busy farm(*this);
+  auto& [service, endpoint, worker, id] = farm;
   const AskPicture last{"test"}, partial{"test", false, FrameNumber(0), true};
   EXPECT_THAT(refused(endpoint, last).message, HasSubstr("no frame is written yet"));
   EXPECT_THAT(refused(endpoint, partial).message, HasSubstr("no tile of frame 1 is finished yet"));
   EXPECT_THAT(refused(endpoint, AskPicture{"test", true, FrameNumber(9)}).message,
-              HasSubstr("no frame 9, expected one of 1-4"));
+              HasSubstr("no frames 9, expected some of 1-4"));
 
   worker.do_one_task();
   const auto tiles = ask<PictureSource>(endpoint, partial);
