@@ -35,21 +35,6 @@ void tell_lost(const std::string& job, const LostFiles& lost) {
                    : "");
 }
 
-/// Frames that are not locked any more, and of which nothing is known but that they were, are the
-/// job's again.
-TasksReopened reopen_left_frames(const Digest& job, const Scheduler::Job& known,
-                                 const std::vector<FrameNumber>& frames) {
-  const std::set<FrameNumber> unlocked(frames.begin(), frames.end());
-  TasksReopened left{job, {}, "they are not locked any more"};
-  for (FrameIndex frame; frame.index() < known.spec.frames.size(); ++frame) {
-    const std::vector<BlobRef>& made = known.tasks.made().outputs(frame.value());
-    if (unlocked.contains(known.spec.frames[frame.index()]) && !made.empty() &&
-        made.front().is_placeholder())
-      left.tasks.push_back(assemble_task(frame));
-  }
-  return left;
-}
-
 }  // namespace
 
 // ---- taking up the journal ----------------------------------------------------------------------
@@ -289,7 +274,6 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   spdlog::info("job {}: frames {} are {}", farm_.history.name_of(*job), format_frames(frames),
                message.off ? "unlocked" : "locked");
   BATON_TRY(farm_.step(FramesLocked{*job, std::move(places)}));
-  if (message.off && is_open_now) BATON_TRY(farm_.step(reopen_left_frames(*job, *known, frames)));
   if (const Result<std::string> marked = farm_.mark_output(*job); !marked) return marked.error();
   if (message.off) BATON_TRY(locks.tell_again(document->job, id));
   if (!is_away && !is_open_now)

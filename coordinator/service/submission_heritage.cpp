@@ -33,7 +33,7 @@ std::string Submission::newest_renderer(const std::vector<InFolder>& jobs,
 KeptFiles Submission::kept_files(const JobSpec& job, const LockedFrames& locked) {
   return {.has_frame =
               [this, &job](FrameIndex frame, const BlobRef& image) {
-                return !image.is_placeholder() && files_.is_right(frame_path(job, frame), image);
+                return files_.is_right(frame_path(job, frame), image);
               },
           .has_blob = [this](const BlobRef& blob) { return farm_.store.contains(blob.digest); },
           .locked = locked.frames()};

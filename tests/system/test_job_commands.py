@@ -229,6 +229,21 @@ def frames_are_rendered_once_more(programs, folder):
         check_equal(programs.pixels(folder / "frames"), frames, "frames")
         newer = sorted(file.name for file, time_ns in times.items() if file.stat().st_mtime_ns > time_ns)
         check_equal(newer, ["frame.0002.exr", "frame.0003.exr"], "frames that were written again")
+        # Locked meanwhile, and unlocked before its end or after: nobody has changed it, so it is the job's.
+        third = folder / "frames/frame.0003.exr"
+        for is_late in (False, True):
+            before_ns = third.stat().st_mtime_ns
+            farm.baton("worker", "hold", "worker0")
+            farm.baton("job", "requeue", job, "--frames", "3", "--yes")
+            farm.baton("job", "lock", job, "--frames", "3")
+            if is_late:
+                farm.baton("worker", "hold", "worker0", "--off")
+                farm.wait_for(job)
+            farm.baton("job", "lock", job, "--frames", "3", "--off")
+            farm.baton("worker", "hold", "worker0", "--off")
+            farm.wait_for(job)
+            check_equal(programs.pixels(folder / "frames"), frames, "frames")
+            check(third.stat().st_mtime_ns > before_ns, "it was not rendered")
         farm.baton("job", "lock", job, "--frames", "2")
         check("frame 2 is locked" in farm.baton("job", "requeue", job, "--frames", "1-2", "--yes", expect=USAGE).stderr, "locked")
         check("frames requeued" in farm.baton("farm", "events", "--job", job).stdout, "events")
