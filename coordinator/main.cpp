@@ -14,6 +14,7 @@
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/base/log.h"
+#include "common/base/option_environment.h"
 #include "common/base/option_values.h"
 #include "common/base/settings.h"
 #include "common/image/exr_check.h"
@@ -126,6 +127,7 @@ int main(int argc, char** argv) {
     return static_cast<int>(baton::exit_code_of(settings.error().kind));
   }
   try {
+    baton::limit_environment(app, argc, argv);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return baton::end_parsing(app, error);

@@ -13,6 +13,7 @@
 #include "common/base/command_pages.h"
 #include "common/base/legible.h"
 #include "common/base/log.h"
+#include "common/base/option_environment.h"
 #include "common/base/option_values.h"
 #include "common/base/settings.h"
 #include "worker/run/crash_handler.h"
@@ -190,6 +191,7 @@ int main(int argc, char** argv) {
     return static_cast<int>(baton::exit_code_of(settings.error().kind));
   }
   try {
+    baton::limit_environment(app, argc, argv);
     app.parse(argc, argv);
     if (!replay_command->parsed() && worker.endpoint.empty())
       throw CLI::RequiredError("--coordinator");

@@ -21,6 +21,12 @@ std::uint64_t machine_memory_bytes() {
   return bytes;
 }
 
+std::uint64_t resident_bytes() {
+  std::uint64_t all = 0, resident = 0;
+  if (!(std::ifstream("/proc/self/statm") >> all >> resident)) return 0;
+  return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
 std::uint64_t default_memory_bytes() { return machine_memory_bytes() / 2; }
 
 }  // namespace baton

@@ -22,7 +22,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 19;
+inline constexpr std::uint16_t kProtocolVersion = 20;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.
@@ -43,6 +43,8 @@ struct LeaseRequest {
 };
 struct Heartbeat {
   std::vector<LeaseId> running;
+  bool is_draining = false;        ///< it takes nothing new, and will end
+  std::uint64_t memory_bytes = 0;  ///< that the worker has; 0: not known
 };
 struct TaskDone {
   LeaseId lease;
@@ -250,6 +252,7 @@ struct WorkerSummary {
   bool is_draining = false;
   /// It takes nothing new until it is released.
   bool is_held = false;
+  std::uint64_t memory_bytes = 0;  ///< as it said last; 0: it has not
   WorkerActivity activity = WorkerActivity::idle;
   double silent_s = 0;  ///< since its last sign of life
   std::string build = {}, renderer = {};

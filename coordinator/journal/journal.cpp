@@ -34,12 +34,20 @@ Status read_enum(const SqlDatabase& database, std::int64_t number, const char* c
   return {};
 }
 
+/// The first columns of the row: kind, step, tile.
+Result<TaskKey> read_task(const SqlDatabase& database, const SqlStatement& row,
+                          const char* kind_column) {
+  TaskKey task;
+  BATON_TRY(read_enum(database, row.integer(0), kind_column, task.kind));
+  task.position = static_cast<std::int32_t>(row.integer(1));
+  task.tile = static_cast<std::int32_t>(row.integer(2));
+  return task;
+}
+
 /// Columns: kind, step, tile, outputs, stats, frames.
 Result<Completion> read_completion(const SqlDatabase& database, const SqlStatement& row) {
   Completion completion;
-  BATON_TRY(read_enum(database, row.integer(0), "completions.kind", completion.task.kind));
-  completion.task.position = static_cast<std::int32_t>(row.integer(1));
-  completion.task.tile = static_cast<std::int32_t>(row.integer(2));
+  BATON_ASSIGN(completion.task, read_task(database, row, "completions.kind"));
   BATON_TRY(read_blob(database, row.blob(3), "completions.outputs", completion.made.outputs));
   BATON_TRY(read_blob(database, row.blob(4), "completions.stats", completion.made.stats));
   BATON_TRY(read_blob(database, row.blob(5), "completions.frames", completion.made.frames));
@@ -111,9 +119,24 @@ Result<std::vector<Digest>> Journal::jobs() {
 }
 
 Status Journal::for_each_completion(const Digest& job,
-                                    const std::function<Status(const Completion&)>& visit) {
-  BATON_TRY(visit_recorded(job, visit));
-  return visit_archived(job, visit);
+                                    const std::function<Status(const Completion&)>& visit,
+                                    Which which) {
+  if (which == Which::done) {
+    BATON_TRY(visit_recorded(job, visit));
+    return visit_archived(job, visit);
+  }
+  BATON_ASSIGN(
+      SqlStatement query,
+      database_.prepare("SELECT kind, step, tile, outputs FROM former_outputs WHERE job = ?"));
+  query.bind(job);
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return {};
+    Completion former;
+    BATON_ASSIGN(former.task, read_task(database_, query, "former_outputs.kind"));
+    BATON_TRY(read_blob(database_, query.blob(3), "former_outputs.outputs", former.made.outputs));
+    BATON_TRY(visit(former));
+  }
 }
 
 Status Journal::visit_recorded(const Digest& job,
@@ -165,6 +188,13 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   if (is_known) result.renderer = renderer.text(0);
   BATON_ASSIGN(SqlStatement mixed, database_.prepare("SELECT 1 FROM mixed_jobs WHERE job = ?"));
   BATON_ASSIGN(result.is_mixed, mixed.bind(digest).step());
+  BATON_TRY(for_each_completion(
+      digest,
+      [&](const Completion& former) -> Status {
+        result.former.push_back({former.task, former.made.outputs});
+        return {};
+      },
+      Which::former));
   return result;
 }
 
@@ -299,7 +329,7 @@ Status Journal::delete_job(const Digest& job) {
         "DELETE FROM output_marks WHERE job = ?", "DELETE FROM marked_folders WHERE job = ?",
         "DELETE FROM versions WHERE document = ?", "DELETE FROM renderers WHERE job = ?",
         "DELETE FROM mixed_jobs WHERE job = ?", "DELETE FROM former_renderers WHERE job = ?",
-        "DELETE FROM jobs WHERE digest = ?"})
+        "DELETE FROM former_outputs WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   BATON_TRY(change("DELETE FROM growth WHERE id NOT IN (SELECT id FROM versions)"));
   BATON_TRY(change("DELETE FROM priorities WHERE id NOT IN (SELECT id FROM versions)"));
@@ -379,7 +409,13 @@ Status Journal::record_marked_folder(const Digest& job, const std::string& folde
   return change("INSERT OR IGNORE INTO marked_folders (folder, job) VALUES (?, ?)", folder, job);
 }
 
-Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks) {
+Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks,
+                                const std::vector<Completions::Task>& former) {
+  for (const Completions::Task& before : former) {
+    BATON_TRY(change("INSERT OR REPLACE INTO former_outputs VALUES (?, ?, ?, ?, ?)", job,
+                     before.task.kind, before.task.position, before.task.tile,
+                     to_bytes(before.outputs)));
+  }
   for (const TaskKey& task : tasks) {
     BATON_TRY(change("DELETE FROM completions WHERE job = ? AND kind = ? AND step = ? AND tile = ?",
                      job, task.kind, task.position, task.tile));

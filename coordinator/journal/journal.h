@@ -28,6 +28,8 @@ struct JournalledJob {
   std::vector<Failure> failures;
   std::string renderer = {};  ///< of what is done of it; empty: not known
   bool is_mixed = false;      ///< others have made some of it, too
+  /// What tasks made that were opened again: it must come out alike.
+  std::vector<Completions::Task> former = {};
 };
 
 /// How the file of a finished frame stood when its bytes had this digest.
@@ -126,15 +128,18 @@ class Journal {
   Status record_store_token(const std::string& token);
   /// The open jobs whose output folders are marked.
   Result<std::set<Digest>> output_marks();
-  /// Every completion of a job, in the archive or not, in the order in which they were recorded.
+  /// Every completion of a job, in the archive or not, in the order in which they were recorded;
+  /// or, in no order, what JournalledJob::former says.
+  enum class Which { done, former };
   Status for_each_completion(const Digest& job,
-                             const std::function<Status(const Completion&)>& visit);
+                             const std::function<Status(const Completion&)>& visit,
+                             Which which = Which::done);
   /// At most `count` failed attempts, the newest last; below 0: all.
   Result<std::vector<Failure>> recent_failures(const Digest& job, int count);
 
   Status add_job(const Digest& job, const std::string& document, const JobIndex& index = {});
-  /// Lets a job run again, in the archive or not, and forgets its failures and completions: those
-  /// that still hold are to be recorded anew.
+  /// Lets a job run again, in the archive or not, and forgets its failures, completions and former
+  /// outputs: those that still hold are to be recorded anew.
   Status restart_job(const Digest& job);
   Status record_plan(const Digest& job, const JobPlan& plan);
   /// Forgets all of a job.
@@ -158,8 +163,9 @@ class Journal {
   /// What a job's output folder was, without links, when it was marked or a frame locked in it.
   Result<std::vector<std::string>> marked_folders(const Digest& job);
   Status record_marked_folder(const Digest& job, const std::string& folder);
-  /// Forgets that these tasks were done.
-  Status record_reopened(const Digest& job, const std::vector<TaskKey>& tasks);
+  /// Forgets that these tasks were done, and remembers what some of them made.
+  Status record_reopened(const Digest& job, const std::vector<TaskKey>& tasks,
+                         const std::vector<Completions::Task>& former = {});
 
   // ---- the archive (journal_archive.cpp)
   /// Puts a job that has ended into the archive. summary, detail: for people, as the caller likes.

@@ -61,9 +61,9 @@ Status Journal::restart_job(const Digest& job) {
         "INSERT OR IGNORE INTO former_renderers SELECT job, '' FROM mixed_jobs WHERE job = ?",
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "DELETE FROM completions WHERE job = ?", kForgetFrameFiles,
-        "DELETE FROM renderers WHERE job = ?", "DELETE FROM mixed_jobs WHERE job = ?",
-        "UPDATE jobs SET archived = 0 WHERE digest = ?"})
+        "DELETE FROM completions WHERE job = ?", "DELETE FROM former_outputs WHERE job = ?",
+        kForgetFrameFiles, "DELETE FROM renderers WHERE job = ?",
+        "DELETE FROM mixed_jobs WHERE job = ?", "UPDATE jobs SET archived = 0 WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   return record_status(job, JobStatus::running);
 }

@@ -80,6 +80,7 @@ inline constexpr const char* kSchema = R"sql(
 /// happened to that job, `locked_frames` which of its frames count as done whatever is in their
 /// files and `lock_times` when that last changed, `priorities` which priority a person has set in
 /// place of the one that is written in its document, `growth` how it has come by its sweeps.
+/// `former_outputs` is what tasks made that were opened again: it must come out alike.
 /// `pictures_given_up` are those that a job may replace though no job has written them;
 /// `marked_folders` what output folders were, without links, when a job marked them, or a frame in
 /// them was locked. `events` is appended to alone (FarmEvent), without an index, which would cost
@@ -125,6 +126,9 @@ inline constexpr const char* kLaterTables = R"sql(
     PRIMARY KEY (id, file)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS marked_folders (
     folder TEXT NOT NULL, job TEXT NOT NULL, PRIMARY KEY (folder, job)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS former_outputs (
+    job TEXT NOT NULL, kind INTEGER NOT NULL, step INTEGER NOT NULL, tile INTEGER NOT NULL,
+    outputs BLOB NOT NULL, PRIMARY KEY (job, kind, step, tile)) WITHOUT ROWID;
   CREATE TABLE IF NOT EXISTS growth (
     id TEXT PRIMARY KEY, since_ms INTEGER NOT NULL, sweeps INTEGER NOT NULL,
     said TEXT NOT NULL) WITHOUT ROWID;

@@ -88,6 +88,8 @@ struct JobAdded {
   std::vector<TaskKey> lost = {};
   /// Blobs that are gone and that nobody needs now (BlobLedger::spare_blobs).
   std::vector<BlobRef> lost_spares = {};
+  /// What tasks made that are open again: it must come out alike.
+  std::vector<Completions::Task> former = {};
   JobPlan plan = {};  ///< its leading runs stand in `spec`, too
   /// Of what is done of it (held_to); empty: not known.
   std::string renderer = {};
@@ -259,6 +261,8 @@ struct RecordReopened {
   Digest job;
   std::vector<TaskKey> tasks;
   std::string why = "something of them is gone";  ///< for people
+  /// What those of them made that must come out alike.
+  std::vector<Completions::Task> former = {};
 };
 struct RecordJobStatus {
   Digest job;

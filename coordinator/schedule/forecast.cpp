@@ -39,6 +39,7 @@ struct Played {
   std::vector<std::int32_t> missing;  ///< inputs of each task that are not done
   std::set<TaskIndex> ready;
   std::size_t num_open = 0;
+  int at_once = 0;  ///< tasks in work
   double end = 0;
 
   explicit Played(const ForecastJob& played) : job(played) {
@@ -114,11 +115,12 @@ class Play {
   void begin(std::size_t job, TaskIndex task, double seconds) {
     running_.push({now_ + seconds, job, task});
     --free_;
+    ++jobs_[job].at_once;
   }
   void grant() {
     for (std::size_t j = 0; j < jobs_.size() && free_ > 0; ++j) {
       std::set<TaskIndex>& ready = jobs_[j].ready;
-      while (free_ > 0 && !ready.empty()) {
+      while (free_ > 0 && !ready.empty() && jobs_[j].at_once < jobs_[j].job.most_at_once) {
         const TaskIndex task = *ready.begin();
         ready.erase(ready.begin());
         begin(j, task, draw(j, task));
@@ -127,6 +129,7 @@ class Play {
   }
   void finish(std::size_t j, TaskIndex task) {
     Played& played = jobs_[j];
+    --played.at_once;
     if (--played.num_open == 0) played.end = now_;
     const JobGraph& graph = played.job.graph;
     for (const TaskIndex next : graph.dependents(graph.key(task))) {
@@ -175,7 +178,7 @@ std::vector<Eta> added_up(std::span<const ForecastJob> jobs, int num_threads) {
     for (TaskIndex task = 0; task < job.graph.num_tasks(); ++task) {
       if (is_open(job.book.status(task))) seconds += expected_seconds(job, task, 0);
     }
-    const double likely = seconds / num_threads;
+    const double likely = seconds / std::max(std::min(num_threads, job.most_at_once), 1);
     const double factor = std::exp(kNineInTen * uncertainty(job));
     etas.push_back({likely / factor, likely, likely * factor});
   }

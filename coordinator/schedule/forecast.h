@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,8 @@ struct ForecastJob {
   const JobGraph& graph;
   const TaskBook& book;
   const TaskTimes& times;
+  /// Tasks that the workers have in hand at once that may do it.
+  int most_at_once = std::numeric_limits<int>::max();
   /// How long each leased task has been in work.
   std::vector<std::pair<TaskIndex, double>> in_work = {};
 };
@@ -24,10 +27,10 @@ struct ForecastJob {
 StepSpan steps_of(const JobGraph& graph, const TaskKey& task);
 
 /// Plays the open jobs to their end on so many threads, as Scheduler would grant their tasks if all
-/// workers were alike and none came or went: jobs in this order, of each the first ready task. What
-/// is in work goes on. With very many tasks only their times are added up. Not known is that of a
-/// job with tasks of a kind of which too few are done (TaskTimes::kLeast), and of all behind it;
-/// without threads that of all.
+/// workers were alike and none came or went: jobs in this order, of each the first ready task, of
+/// none more than most_at_once. What is in work goes on. With very many tasks only their times are
+/// added up. Not known is that of a job with tasks of a kind of which too few are done
+/// (TaskTimes::kLeast), and of all behind it; without threads that of all.
 std::vector<Eta> forecast(const std::vector<ForecastJob>& jobs, int num_threads);
 
 }  // namespace baton

@@ -26,7 +26,7 @@ JobProgress JobTasks::progress() const {
 void JobTasks::complete(TaskIndex task, const Completion& completion, const std::string& worker,
                         bool is_shared, BlobReferences& blobs) {
   made_.set_maker(task, worker);
-  if (made_.former_outputs(task).empty()) {
+  if (!made_.is_counted(task)) {
     stats_.merge(completion.made.stats);
     const bool is_frame = completion.task.kind == TaskKind::assemble;
     for (const FrameStats& stats : completion.made.frames)
@@ -94,6 +94,12 @@ std::vector<TaskIndex> JobTasks::restore(const Completions& completions,
   }
   ledger_.forget_done_cuts(view());
   return reopened;
+}
+
+void JobTasks::remember(const Completions::Task& former) {
+  const std::optional<TaskIndex> task = graph_.find(former.task);
+  std::vector<BlobRef> outputs = former.outputs;
+  if (task && !graph_.check_outputs(former.task, outputs)) made_.remember(*task, outputs);
 }
 
 std::optional<TaskIndex> JobTasks::publish(const PublishedState& state, const std::string& worker,

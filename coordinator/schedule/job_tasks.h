@@ -52,6 +52,8 @@ class JobTasks {
   /// were.
   std::vector<TaskIndex> restore(const Completions& completions, const std::vector<BlobRef>& gone,
                                  BlobReferences& blobs, const JobPlan& plan = {});
+  /// What a task made before the restored ones: it must come out alike.
+  void remember(const Completions::Task& former);
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(TaskIndex task) { return book_.grant(graph_, task); }
   /// Leases a ready task once more by an attempt that was granted before.

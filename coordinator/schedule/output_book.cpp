@@ -9,7 +9,16 @@ namespace baton {
 const std::vector<BlobRef>& OutputBook::former_outputs(TaskIndex task) const {
   static const std::vector<BlobRef> kNone;
   const auto found = former_.find(task);
-  return found == former_.end() ? kNone : found->second;
+  return found == former_.end() ? kNone : found->second.outputs;
+}
+
+bool OutputBook::is_counted(TaskIndex task) const {
+  const auto found = former_.find(task);
+  return found != former_.end() && found->second.is_counted;
+}
+
+void OutputBook::remember(TaskIndex task, std::vector<BlobRef> outputs) {
+  former_.try_emplace(task, Former{std::move(outputs), /*is_counted=*/false});
 }
 
 bool OutputBook::tells_makers() const { return makers_.size() <= limits::kMaxWorkers; }
@@ -54,7 +63,7 @@ void OutputBook::remove(const JobGraph& graph, TaskIndex task, bool remember) {
   std::vector<BlobRef> before = std::exchange(record(task).outputs, {});
   for (const BlobRef& output : before) count(graph, output, false);
   if (remember && !before.empty() && !before.front().is_any_image())
-    former_[task] = std::move(before);
+    former_[task] = {std::move(before)};
 }
 
 }  // namespace baton

@@ -27,6 +27,8 @@ class OutputBook {
   const std::vector<BlobRef>& outputs(TaskIndex task) const { return record(task).outputs; }
   /// What the task made when it was done before it was opened again; sorted, or empty.
   const std::vector<BlobRef>& former_outputs(TaskIndex task) const;
+  /// Whether what it counted when it was done before is still in the job's sums.
+  bool is_counted(TaskIndex task) const;
   /// The worker that completed the task last; stranger() where that is not known.
   const std::string& maker(TaskIndex task) const { return makers_[record(task).maker]; }
   /// Stands for workers of an earlier coordinator, and for all beyond limits::kMaxWorkers.
@@ -42,6 +44,8 @@ class OutputBook {
   void set_maker(TaskIndex task, const std::string& worker);
   /// A held state is in the store now.
   void publish_state(const JobGraph& graph, TaskIndex task, const BlobRef& published);
+  /// What the task made before this coordinator began, if nothing is known that is newer.
+  void remember(TaskIndex task, std::vector<BlobRef> outputs);
   /// The task is not done any more. remember: what it makes must come out alike.
   void remove(const JobGraph& graph, TaskIndex task, bool remember);
 
@@ -55,7 +59,11 @@ class OutputBook {
   void count(const JobGraph& graph, const BlobRef& output, bool made);
 
   std::vector<Record> records_;
-  std::map<TaskIndex, std::vector<BlobRef>> former_;
+  struct Former {
+    std::vector<BlobRef> outputs;
+    bool is_counted = true;
+  };
+  std::map<TaskIndex, Former> former_;
   std::vector<std::string> makers_{"(not known)"};
   std::map<std::string, std::uint16_t> maker_numbers_;
   Totals totals_;

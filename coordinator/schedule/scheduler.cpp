@@ -270,8 +270,15 @@ bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<Bl
   const std::string& maker = job.tasks.made().maker(*job.tasks.graph().find(event.lease.task));
   actions.push_back(ReportConflict{event.lease, event.worker, maker, *e, *r});
   if (job.status != JobStatus::running) return false;
-  job.waits = fmt::format("somebody to look: workers {} and {} have made different bytes of {}",
-                          maker, event.worker, place_text(place_of(job, event.lease.task)));
+  const std::string place = place_text(place_of(job, event.lease.task));
+  job.waits =
+      maker == job.tasks.made().stranger()
+          ? fmt::format(
+                "somebody to look: worker {} has made other bytes of {} than were there "
+                "before (`baton farm events` says who had made them)",
+                event.worker, place)
+          : fmt::format("somebody to look: workers {} and {} have made different bytes of {}",
+                        maker, event.worker, place);
   pause_job(digest, job, job.waits, actions);
   return false;
 }
@@ -390,6 +397,7 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
   for (const TaskIndex task :
        job.tasks.restore(event.completions, event.lost_spares, blobs_, event.plan))
     needed.tasks.push_back(job.tasks.graph().key(task));
+  for (const Completions::Task& former : event.former) job.tasks.remember(former);
   if (!needed.tasks.empty()) actions.push_back(std::move(needed));
   reopen({event.job, event.lost}, job, actions);
   reopen({event.job, held_by_strangers(job.tasks), "what workers held is gone"}, job, actions);
@@ -408,8 +416,11 @@ void Scheduler::reopen(RecordReopened record, Job& job, Actions& actions) {
   for (const TaskKey& key : std::exchange(record.tasks, {})) {
     const std::optional<TaskIndex> task = job.tasks.graph().find(key);
     if (!task) continue;
-    for (const TaskIndex again : job.tasks.reopen(*task, blobs_))
+    for (const TaskIndex again : job.tasks.reopen(*task, blobs_)) {
       record.tasks.push_back(job.tasks.graph().key(again));
+      const std::vector<BlobRef>& former = job.tasks.made().former_outputs(again);
+      if (!former.empty()) record.former.push_back({record.tasks.back(), former});
+    }
   }
   if (!record.tasks.empty()) actions.push_back(std::move(record));
 }

@@ -131,13 +131,13 @@ JobNow Answers::now_of(const Digest& version, JobStatus status) const {
 }
 
 Eta Answers::eta_of(const Digest& version) const {
-  int num_slots = 0;
+  EtaBook::Slots slots;
   for (const WorkerSummary& worker : farm_.peers.summaries()) {
     // One task waits at each for a thread (Session::request_leases), and counts as in work.
     const bool takes = !worker.is_draining && !farm_.history.past().is_held(worker.worker_id);
-    if (takes) num_slots += worker.num_threads + 1;
+    if (takes) slots.emplace_back(worker.worker_id, worker.num_threads + 1);
   }
-  return farm_.history.etas().of(version, farm_.scheduler, num_slots, now_);
+  return farm_.history.etas().of(version, farm_.scheduler, slots, now_);
 }
 
 Result<ReasonChain> Answers::why_job(const Digest& version, JobStatus status,
@@ -401,7 +401,7 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::ended:
       return fmt::format("{} is {}", cause.task ? place(cause) : "the job", cause.text);
     case ReasonKind::draining:
-      if (std::ranges::any_of(cause.workers, [this](const std::string& worker) {
+      if (std::ranges::all_of(cause.workers, [this](const std::string& worker) {
             return farm_.history.past().is_held(worker);
           }))
         return fmt::format("{} {} held, and {} nothing new", who, many ? "are" : "is",

@@ -9,6 +9,15 @@ constexpr std::chrono::seconds kLeastInterval{2};
 /// A forecast takes this share of the coordinator's time at most.
 constexpr int kShareOfTime = 20;
 
+/// Whether the worker gets tasks of the job.
+bool may_work(const Scheduler& scheduler, const Digest& version, const std::string& worker,
+              TimePoint now) {
+  const Scheduler::Job& job = *scheduler.find_job(version);
+  const LeaseBook& leases = scheduler.leases();
+  return leases.knows(worker) && leases.renders_as(worker, renderer_of(version, job, leases)) &&
+         !rests(job.crew(leases, now), worker);
+}
+
 double seconds_of(TimePoint::duration time) { return std::chrono::duration<double>(time).count(); }
 
 }  // namespace
@@ -55,10 +64,11 @@ void EtaBook::forget(const Digest& version) {
   std::erase_if(begun_, [&](const auto& entry) { return entry.first == version; });
 }
 
-EtaBook::Found EtaBook::find(const Scheduler& scheduler, int num_slots, TimePoint now) const {
+EtaBook::Found EtaBook::find(const Scheduler& scheduler, const Slots& slots, TimePoint now) const {
   static const TaskTimes kNone;
   std::vector<Digest> versions;
   std::vector<ForecastJob> jobs;
+  std::set<std::string> useful;
   for (const Digest& version : scheduler.in_turn()) {
     const Scheduler::Job& job = *scheduler.find_job(version);
     if (!job.waits.empty() || scheduler.lacks_renderer(version)) continue;
@@ -66,10 +76,18 @@ EtaBook::Found EtaBook::find(const Scheduler& scheduler, int num_slots, TimePoin
     versions.push_back(version);
     jobs.push_back(
         {job.tasks.graph(), job.tasks.book(), times == times_.end() ? kNone : times->second});
+    jobs.back().most_at_once = 0;
+    for (const auto& [worker, count] : slots) {
+      if (!may_work(scheduler, version, worker, now)) continue;
+      jobs.back().most_at_once += count;
+      useful.insert(worker);
+    }
     for (const TaskIndex task : scheduler.leases().of_job(version))
       jobs.back().in_work.emplace_back(
           task, seconds_of(now - scheduler.leases().at({version, task}).granted_at));
   }
+  int num_slots = 0;
+  for (const auto& [worker, count] : slots) num_slots += useful.contains(worker) ? count : 0;
   const std::vector<Eta> etas = forecast(jobs, num_slots);
   const auto took = std::chrono::steady_clock::now() - now;
   Found found{{}, now, now + std::max<TimePoint::duration>(kLeastInterval, kShareOfTime * took)};
@@ -77,9 +95,9 @@ EtaBook::Found EtaBook::find(const Scheduler& scheduler, int num_slots, TimePoin
   return found;
 }
 
-Eta EtaBook::of(const Digest& version, const Scheduler& scheduler, int num_slots,
+Eta EtaBook::of(const Digest& version, const Scheduler& scheduler, const Slots& slots,
                 TimePoint now) const {
-  if (now >= found_.again) found_ = find(scheduler, num_slots, now);
+  if (now >= found_.again) found_ = find(scheduler, slots, now);
   const auto found = found_.etas.find(version);
   if (found == found_.etas.end() || !found->second.is_known()) return {};
   const double passed = seconds_of(now - found_.at);

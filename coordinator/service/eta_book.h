@@ -25,9 +25,13 @@ class EtaBook {
   /// A version of a job has ended.
   void forget(const Digest& version);
 
-  /// Of a job that runs. num_slots: tasks that the workers have in hand at once. What was found is
+  /// Tasks that each worker that takes some has in hand at once.
+  using Slots = std::vector<std::pair<std::string, int>>;
+
+  /// Of a job that runs. slots: of whom is here. What was found is
   /// told for some seconds, less what has passed, since a forecast of many tasks takes its time.
-  Eta of(const Digest& version, const Scheduler& scheduler, int num_slots, TimePoint now) const;
+  Eta of(const Digest& version, const Scheduler& scheduler, const Slots& slots,
+         TimePoint now) const;
 
  private:
   struct Found {
@@ -36,7 +40,7 @@ class EtaBook {
   };
   void note(const Digest& version, const JobGraph& graph, const TaskKey& task,
             const std::string& worker, double seconds);
-  Found find(const Scheduler& scheduler, int num_slots, TimePoint now) const;
+  Found find(const Scheduler& scheduler, const Slots& slots, TimePoint now) const;
 
   std::map<Digest, TaskTimes> times_;
   std::set<std::pair<Digest, std::string>> begun_;  ///< workers that have done a task of a job

@@ -194,7 +194,7 @@ Status FarmCore::perform(const RecordFailure& action) {
 Status FarmCore::perform(const RecordReopened& action) {
   spdlog::warn("job {}: {}", history.name_of(action.job), reopened_text(action));
   BATON_TRY(history.reopened(action));
-  return journal.record_reopened(action.job, action.tasks);
+  return journal.record_reopened(action.job, action.tasks, action.former);
 }
 
 Status FarmCore::perform(const RecordJobStatus& action) {

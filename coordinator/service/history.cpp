@@ -73,7 +73,10 @@ Status History::submitted(const Digest& document, const JobId& job, const std::s
   if (!jobs_.is_newest(document)) BATON_TRY(jobs_.add_version(journal_, document, job));
   JobTimes times = jobs_.of(document).times;
   if (times.submitted_ms == 0) times.submitted_ms = now_ms();
-  if (times.ended_ms != 0) times.started_ms = 0;
+  if (times.ended_ms != 0) {
+    before_[job] = times;
+    times.started_ms = 0;
+  }
   times.ended_ms = 0;
   BATON_TRY(jobs_.set_times(journal_, job, times));
   return tell({.kind = is_changed ? FarmEventKind::job_changed : FarmEventKind::job_submitted,
@@ -88,7 +91,10 @@ Status History::status_changed(const Digest& version, JobStatus status, const st
   const JobIdentity job = jobs_.of(version);
   JobTimes times = job.times;
   times.ended_ms = is_open(status) ? 0 : now_ms();
-  // Nothing had to be rendered.
+  // Where nothing had to be rendered, it was done when it was.
+  const auto before = before_.find(job.id);
+  if (status == JobStatus::done && before != before_.end()) times = before->second;
+  if (!is_open(status) && before != before_.end()) before_.erase(before);
   if (status == JobStatus::done && times.started_ms == 0) times.started_ms = times.ended_ms;
   BATON_TRY(jobs_.set_times(journal_, job.id, times));
   const double seconds = times.ended_ms == 0 || times.started_ms == 0
@@ -130,6 +136,7 @@ Status History::prioritized(const Digest& version, std::int32_t before,
 Status History::granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker,
                         const std::string& reason) {
   const JobIdentity who = jobs_.of(lease.job);
+  before_.erase(who.id);
   if (who.times.started_ms == 0) {
     JobTimes times = who.times;
     times.started_ms = now_ms();

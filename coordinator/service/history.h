@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <string>
 
 #include "coordinator/journal/journal.h"
@@ -70,6 +71,8 @@ class History {
   IdentityBook jobs_;
   RecentPast past_;
   EtaBook etas_;
+  /// Of jobs that had ended and go on, of which nothing has been granted since.
+  std::map<JobId, JobTimes> before_;
   std::string actor_;
 };
 

@@ -150,7 +150,10 @@ Status tell_locks(Journal& journal, const JobSpec& spec, const std::vector<Diges
 Status tell_locks_again(Journal& journal, const JobSpec& spec, const IdentityBook& jobs,
                         const JobId& id, const Roots& roots) {
   const Status told = tell_locks(journal, spec, jobs.versions(id), id, jobs.locks(id), roots);
-  if (told || told.error().kind != ErrorKind::io) return told;
+  // Whatever stands in a folder that is somebody's ends no coordinator.
+  const bool is_of_folder =
+      !told && (told.error().kind == ErrorKind::io || told.error().kind == ErrorKind::bad_input);
+  if (!is_of_folder) return told;
   spdlog::warn("other coordinators do not see which frames are locked: {}", told.error().message);
   return {};
 }

@@ -14,9 +14,15 @@ void Peers::add(const PeerId& peer, const WorkerHello& hello, const std::string&
                       before->second.hello.instance == hello.instance;
   remove(worker_of(peer));
   remove(hello.worker_id);
-  workers_[hello.worker_id] = {peer, hello, bearer, drains};
+  workers_[hello.worker_id] = {peer, hello, bearer, drains, 0};
   names_[peer] = hello.worker_id;
   turned_away_.remove(hello);
+}
+
+void Peers::note(const std::string& worker, const Heartbeat& beat) {
+  Entry& entry = workers_.at(worker);
+  entry.is_draining |= beat.is_draining;
+  entry.memory_bytes = beat.memory_bytes;
 }
 
 void Peers::remove(const std::string& worker) {
@@ -62,6 +68,7 @@ std::vector<WorkerSummary> Peers::summaries() const {
                       .pid = entry.hello.pid,
                       .num_threads = entry.hello.num_threads,
                       .is_draining = entry.is_draining,
+                      .memory_bytes = entry.memory_bytes,
                       .build = entry.hello.build,
                       .renderer = entry.hello.renderer});
   }

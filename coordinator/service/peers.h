@@ -26,6 +26,8 @@ class Peers {
   const TurnedAway& turned_away() const { return turned_away_; }
   /// It was told to finish; that stays so when it connects again.
   void drain(const std::string& worker) { workers_.at(worker).is_draining = true; }
+  /// What a worker, which is known, says of itself now.
+  void note(const std::string& worker, const Heartbeat& beat);
   /// The ID by which a worker goes here: its name, or where another process has that, the name and
   /// some digits of its instance.
   std::string id_for(const WorkerHello& hello) const;
@@ -49,6 +51,7 @@ class Peers {
     WorkerHello hello;
     std::string bearer;
     bool is_draining = false;
+    std::uint64_t memory_bytes = 0;
   };
   std::map<std::string, Entry> workers_;
   std::map<PeerId, std::string> names_;

@@ -281,6 +281,7 @@ Status Service::receive_from(const std::string& worker, const Heartbeat& message
     const auto peer = farm_.peers.peer_of(worker);
     return peer ? farm_.refuse(*peer, few.error()) : Status();
   }
+  farm_.peers.note(worker, message);
   BATON_TRY(farm_.reply_to(worker, Heartbeat{}));
   return farm_.step(WorkerAlive{worker, message.running});
 }

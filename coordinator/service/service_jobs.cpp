@@ -104,6 +104,7 @@ Status Service::restore_job(const Digest& digest) {
   event.spec.leading_runs = known.plan.leading_runs;
   event.spec.priority =
       farm_.history.jobs().priority(farm_.history.jobs().of(digest).id, event.spec.priority);
+  event.former = std::move(known.former);
   event.plan = std::move(known.plan);
   event.renderer = held_to(known.renderer, known.is_mixed, farm_.options.mixed_builds);
   event.is_mixed = known.is_mixed;

@@ -20,8 +20,21 @@
 namespace baton {
 namespace {
 
+/// Whether a folder can be made in that one, which is tried. A disk that is full now, or away, is
+/// waited for: that is no error. Error: as the system has it.
+std::error_code try_to_write(const std::filesystem::path& folder) {
+  std::string probe = (folder / ".baton-XXXXXX").string();
+  if (::mkdtemp(probe.data()) != nullptr) {
+    ::rmdir(probe.c_str());
+    return {};
+  }
+  const bool may_pass = errno == ENOSPC || errno == EDQUOT || errno == EIO || errno == ESTALE ||
+                        errno == EMFILE || errno == ENFILE || errno == ENOMEM;
+  return may_pass ? std::error_code() : std::error_code(errno, std::generic_category());
+}
+
 /// Error, io: something that is no folder stands in its place, or in that of a folder around it, or
-/// nothing can be written there by right. Nothing is made; a disk that is full now is waited for.
+/// nothing can be written there. Nothing is left there.
 Status expect_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::path there = folder;
@@ -30,8 +43,8 @@ Status expect_folder(const std::filesystem::path& folder) {
   std::string fault = " is no folder";
   const char* what = "made";
   if (is_directory(std::filesystem::status(there, error))) {
-    if (::access(there.c_str(), W_OK | X_OK) == 0 || (errno != EROFS && errno != EACCES)) return {};
-    error = {errno, std::generic_category()};
+    error = try_to_write(there);
+    if (!error) return {};
     if (there == folder) what = "written";
   }
   if (error) fault = ": " + error.message();

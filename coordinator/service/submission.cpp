@@ -55,18 +55,22 @@ Result<std::vector<Submission::InFolder>*> Submission::jobs_in(const std::string
   return &entry->second;
 }
 
-/// The one that had the document before, else the one of its name that the same speaker has in its
-/// folder.
+/// The one that had the document before, else the one of its name in its folder that is the
+/// speaker's own, or the newest that an administrator may change.
 Result<JobId> Submission::known_job(const ParsedJobDocument& document) {
   const IdentityBook& known = farm_.history.jobs();
   if (const JobId before = known.of(document.digest).id; !before.empty()) return before;
   BATON_ASSIGN(const std::vector<Digest> namesakes,
                jobs_in_folder(farm_.journal, document.job.output.directory, document.job.name));
-  const auto same =
-      std::ranges::find_if(namesakes.rbegin(), namesakes.rend(), [&](const Digest& v) {
-        return farm_.owner_of(v) == speaker_.name && !known.of(v).id.empty();
-      });
-  return same == namesakes.rend() ? JobId() : known.of(*same).id;
+  const auto newest = [&](const auto& is_meant) {
+    const auto found = std::ranges::find_if(
+        namesakes.rbegin(), namesakes.rend(),
+        [&](const Digest& v) { return is_meant(v) && !known.of(v).id.empty(); });
+    return found == namesakes.rend() ? JobId() : known.of(*found).id;
+  };
+  const JobId own = newest([&](const Digest& v) { return farm_.owner_of(v) == speaker_.name; });
+  const bool may_change_all = !speaker_.name.empty() && speaker_.role == Role::admin;
+  return !own.empty() || !may_change_all ? own : newest([](const Digest&) { return true; });
 }
 
 Status Submission::expect_free_folder(const ParsedJobDocument& document) {
@@ -101,7 +105,7 @@ Result<std::vector<Neighbour>> Submission::find_neighbours(const ParsedJobDocume
       return Error{
           ErrorKind::bad_input,
           fmt::format("job '{}': job {} ('{}', {}) writes into {}: wait for its end, cancel "
-                      "it, or choose another output.directory",
+                      "it (--restart does), or choose another output.directory",
                       document.job.name, farm_.history.name_of(digest), former.document.job.name,
                       job_status_name(other.status), document.job.output.directory)};
     }

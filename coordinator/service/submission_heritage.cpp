@@ -158,9 +158,20 @@ Status Submission::take_over(const Heritage& heritage, const std::string& text, 
   for (const TaskKey& task : adoption.skipped) taken.push_back({task, {}});
 
   if (text.empty()) {
-    BATON_TRY(farm_.journal.restart_job(event.job));
-    // Where nothing of the job itself was looked at, its files may still be there.
+    // Where nothing of the job itself was looked at, its files may still be there, and nothing
+    // must come out as it was.
     const bool was_asked = std::ranges::find(heritage.formers, event.job) != heritage.formers.end();
+    if (was_asked) {
+      BATON_TRY(farm_.journal.for_each_completion(
+          event.job,
+          [&](const Completion& former) -> Status {
+            event.former.push_back({former.task, former.made.outputs});
+            return {};
+          },
+          Journal::Which::former));
+    }
+    BATON_TRY(farm_.journal.restart_job(event.job));
+    BATON_TRY(farm_.journal.record_reopened(event.job, {}, event.former));
     for (const FrameIndex frame : was_asked ? adoption.lost : std::vector<FrameIndex>())
       BATON_TRY(farm_.journal.record_frame_file(event.job, frame, std::nullopt));
   } else {
@@ -172,9 +183,15 @@ Status Submission::take_over(const Heritage& heritage, const std::string& text, 
   event.is_mixed = heritage.is_mixed;
   if (!heritage.renderer.empty() || heritage.is_mixed)
     BATON_TRY(farm_.journal.record_renderer(event.job, heritage.renderer, heritage.is_mixed));
-  if (!speaker_.name.empty() && !farm_.owners.contains(event.job)) {
-    farm_.owners[event.job] = speaker_.name;
-    BATON_TRY(farm_.journal.record_owner(event.job, speaker_.name));
+  // A job stays its owner's, whoever changes it.
+  const std::vector<Digest> versions =
+      farm_.history.jobs().versions(farm_.history.jobs().of(event.job).id);
+  const auto owned = std::ranges::find_if(
+      versions, [&](const Digest& version) { return farm_.owners.contains(version); });
+  const std::string owner = owned == versions.end() ? speaker_.name : farm_.owner_of(*owned);
+  if (!owner.empty() && !farm_.owners.contains(event.job)) {
+    farm_.owners[event.job] = owner;
+    BATON_TRY(farm_.journal.record_owner(event.job, owner));
   }
   event.spec.leading_runs = adoption.plan.leading_runs;
   event.plan = adoption.plan;

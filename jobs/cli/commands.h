@@ -19,6 +19,7 @@ void add_movie_command(CLI::App& app, ExitCode& code);
 void add_render_command(CLI::App& app, ExitCode& code);
 void add_state_command(CLI::App& app, ExitCode& code);
 void add_top_command(CLI::App& app, ExitCode& code);
+void add_trace_command(CLI::App& app, ExitCode& code);
 void add_view_command(CLI::App& app, ExitCode& code);
 void add_worker_command(CLI::App& app, ExitCode& code);
 

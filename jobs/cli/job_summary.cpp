@@ -79,6 +79,9 @@ ordered_json judgement_json(std::span<const FrameReport> frames) {
   return result;
 }
 
+/// Failures have more, such as how to replay them.
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
 }  // namespace
 
 ExitCode exit_code_of_stopped(JobStatus status) {
@@ -110,7 +113,7 @@ std::string job_line(const ListedJob& listed) {
                      fmt::format("{}/{}", job.frames_done, job.frames_total),
                      fmt::format("{}/{}", job.tasks_done, job.tasks_total), job.name,
                      has_eta ? "  " + eta_text(listed.now.eta) : "",
-                     listed.now.reason.empty() ? "" : "  [" + listed.now.reason + "]");
+                     listed.now.reason.empty() ? "" : "  [" + first_line(listed.now.reason) + "]");
 }
 
 std::string long_job_line(const ListedJob& listed) {

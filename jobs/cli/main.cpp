@@ -8,6 +8,7 @@
 #include "common/base/build.h"
 #include "common/base/command_pages.h"
 #include "common/base/log.h"
+#include "common/base/option_environment.h"
 #include "common/base/option_values.h"
 #include "common/base/settings.h"
 #include "common/base/suggest.h"
@@ -42,6 +43,7 @@ constexpr const char* kFooter = R"(Examples:
   baton key create keys              keys for a farm of several machines
   baton chart study.json             error against time of several methods, as charts
   baton compare a.json b.json        two ways to render the same frames, side by side
+  baton trace shot.json              where a rendering's time went (baton render --trace)
   baton state show STATE.blob        what samples a tile hands to its next frame
 
 Exit codes: 0 ok, 1 timeout, 2 failed, 3 cancelled, 64 wrong command line, 65 bad input,
@@ -115,6 +117,7 @@ int main(int argc, char** argv) {
   baton::add_state_command(app, code);
   baton::add_chart_command(app, code);
   baton::add_compare_command(app, code);
+  baton::add_trace_command(app, code);
   baton::add_view_command(app, code);
   baton::add_movie_command(app, code);
   std::vector<baton::Setting> settings;
@@ -133,6 +136,7 @@ int main(int argc, char** argv) {
     }
   }
   try {
+    baton::limit_environment(app, argc, argv);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return baton::end_parsing(app, error);

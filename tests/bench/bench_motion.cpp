@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "common/base/cpu_clock.h"
 #include "common/job/motion.h"
 #include "common/job/text/job_json.h"
 #include "common/scene/settle/settle_motion.h"
 #include "tests/bench/orbit.h"
-#include "worker/pass/cpu_clock.h"
 #include "worker/pass/render_context.h"
 
 namespace baton {

@@ -37,7 +37,7 @@ RUN = EXCHANGE | {"common/protocol", "common/store", "common/scene/settle", "wor
 # Programs that measure look into every room of the worker, and share scenes and statistics with the tests.
 LAB = RUN | METHOD_ROOMS | {"worker/run", "jobs/study", "tests/support", "tests/stat"}
 # Families of commands, and what they share.
-CLI = COMMON_ALL | {"common/scene/settle", "jobs/study", "jobs/auto"}
+CLI = COMMON_ALL | {"common/scene/settle", "jobs/study", "jobs/auto", "jobs/trace"}
 
 MAY_INCLUDE = {
     "common/base": set(),
@@ -81,6 +81,7 @@ MAY_INCLUDE = {
     "jobs/study": TEXT | {"common/image", "common/protocol"},
     "jobs/auto": TEXT | {"jobs/study", "common/scene", "common/scene/mesh"},  # how large a scene is
     "jobs/slurm": COMMON_BASE,
+    "jobs/trace": COMMON_BASE,
     **{f"jobs/lab/{folder}": LAB for folder in ("peers", "stability", "studies")},
     "jobs/cli": CLI,
     "jobs/cli/check": CLI | {"jobs/cli", "common/scene", "common/scene/map", "common/scene/mesh"},  # it loads the scene
@@ -98,7 +99,7 @@ THIRD_PARTY = {
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],
     r"zstd|xxhash": ["common/base/"],
-    r"nlohmann/": ["common/job/text/job_json", "jobs/cli/", "jobs/lab/", "jobs/study/", "common/scene/gltf/json_view"],
+    r"nlohmann/": ["common/job/text/job_json", "jobs/cli/", "jobs/lab/", "jobs/study/", "jobs/trace/", "common/scene/gltf/json_view"],
     r"CLI/": ["worker/main.cpp", "coordinator/main.cpp", "jobs/cli/", "jobs/lab/"],
 }
 

@@ -168,6 +168,19 @@ def a_drained_worker_ends_and_its_work_goes_on(programs, folder):
         farm.baton("job", "wait", job)
 
 
+def a_worker_that_was_told_by_a_signal_says_that_it_ends(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        job = farm.submit(small_job(folder, sampling={"numCandidates": 8192, "numParticles": 64}, quality={"rounds": 8}))
+        first = farm.start_worker()
+        wait_until(lambda: listed_workers(farm) and listed_workers(farm)[0]["tasks"], "it has a task")
+        wait_until(lambda: listed_workers(farm)[0]["memoryBytes"] > 1 << 20, "its memory is known")
+        first.terminate()
+        shown = wait_until(lambda: next((w for w in listed_workers(farm) if w["draining"]), None) or not first.alive(), "it drains, or has")
+        check(shown is True or shown["activity"] == "draining", str(shown))
+        farm.start_worker()
+        farm.baton("job", "wait", job)
+
+
 def a_held_worker_waits(programs, folder):
     """It stays, renders nothing new until it is let go, and whoever asks is told; a coordinator that comes later holds it, too."""
     with Farm(programs, folder / "farm", workers=1) as farm:
@@ -247,6 +260,36 @@ def frames_are_rendered_once_more(programs, folder):
         farm.baton("job", "lock", job, "--frames", "2")
         check("frame 2 is locked" in farm.baton("job", "requeue", job, "--frames", "1-2", "--yes", expect=USAGE).stderr, "locked")
         check("frames requeued" in farm.baton("farm", "events", "--job", job).stdout, "events")
+
+
+def traces_say_where_the_time_went(programs, folder):
+    with Farm(programs, folder / "farm", workers=1, threads=2) as farm:
+        job = farm.submit(small_job(folder / "shot", sampling={"numCandidates": 2048, "numParticles": 64}))
+        other = farm.submit(small_job(folder / "other", seed=9))
+        farm.wait_for(job)
+        farm.wait_for(other)
+        trace = folder / "shot.json"
+        told = json.loads(farm.baton("job", "trace", job, "--out", trace, "--json").stdout)
+        events = json.loads(trace.read_text())
+        tasks = [event for event in events if event.get("cat") == "task"]
+        mine = [event for event in tasks if event.get("args", {}).get("id") == job]
+        check_equal(len(mine), farm.show(job)["tasksDone"], "tasks of the job in its trace")
+        check(other not in trace.read_text(), "another job's task is named")
+        check({"frame", "make", "write"} <= {event.get("cat") for event in events}, "kinds of spans")
+        check(any(event["name"].startswith("light of frame 1") for event in events), "light")
+        check_equal(told["summary"]["threads"], 2, "threads")
+        said = json.loads(programs.run("baton", "trace", trace, "--threads", "1,64", "--json").stdout)
+        one, many = said["played"]
+        check(one["seconds"] > many["seconds"] >= said["longestChain"]["seconds"] - 1e-6, f"played: {said['played']}")
+        check(said["busy"] <= 2 and sum(said["waitedSeconds"].values()) < 2 * said["seconds"], str(said))
+        hidden = farm.baton("job", "trace", job, "--logs", folder / "nowhere", expect=IO)
+        check("no task of job" in hidden.stderr, hidden.stderr)
+    rendered = folder / "render.json"
+    programs.render(small_job(folder / "own"), folder / "work", extra=["--trace", str(rendered)])
+    names = {event["name"] for event in json.loads(rendered.read_text())}
+    check({"starting the farm", "contact sheet", "stopping the farm", "loading the job"} <= names, str(names))
+    check("chain " in programs.run("baton", "trace", rendered).stdout, "the chain")
+    programs.refuses("trace", small_job(folder / "no"), expect=BAD_INPUT, says="expected a trace")
 
 
 def pictures_of_a_job(programs, folder):

@@ -125,6 +125,13 @@ def a_folder_is_its_owners(programs, folder):
         farm.start_worker()
         job = json.loads(farm.speak("user", "job", "submit", small(folder / "job"), "--json").stdout)["id"]
         farm.speak("user", "job", "wait", job)
+        # An administrator changes it, and it stays the user's.
+        refined = json.loads(farm.speak("admin", "job", "refine", job, "--json").stdout)["id"]
+        check_equal(refined, job, "the job's ID")
+        farm.speak("user", "job", "wait", job)
+        check_equal(json.loads(farm.speak("user", "job", "show", job, "--json").stdout)["owner"], "user", "owner")
+        farm.speak("user", "job", "requeue", job, "--frames", "1", "--yes")
+        farm.speak("user", "job", "wait", job)
         farm.let_in("anna")
         files = lambda: {file.name: file.read_bytes() for file in (folder / "job/frames").iterdir() if file.is_file()}
         before = files()

@@ -121,6 +121,20 @@ def an_edited_job_does_not_mix_with_the_one_before(programs, folder):
     check_equal(programs.pixels(folder / "frames"), expected, "frames in other tiles")
 
 
+def an_interrupted_render_goes_on_under_another_name(programs, folder):
+    """Nobody else waits for it in a farm of its own, whatever its name, frames and files are now."""
+    job = make_job(folder, frames="1-12")
+    words = [programs.path("baton"), "render", write_job(folder / "job.json", job), "--work-dir", folder / "work", "--threads-per-worker", "1"]
+    first = Process([str(word) for word in words], folder / "first.log")
+    wait_until(lambda: (folder / "frames/frame.0002.exr").exists(), "two frames are done")
+    first.terminate()
+    check(first.wait() != OK, "it was done too soon")
+    renamed = write_job(folder / "z.json", {**job, "name": "z", "frames": "1-3", "output": {**job["output"], "pattern": "s.####.exr"}})
+    done = programs.render(renamed, folder / "work")
+    check("which was interrupted, makes way" in done.stderr, done.stderr)
+    check_equal(sorted(file.name for file in (folder / "frames").glob("s.*.exr")), [f"s.000{n}.exr" for n in (1, 2, 3)], "frames")
+
+
 def what_is_gone_is_made_again_and_only_that(programs, folder):
     """A frame, a state and a film that are gone or damaged, in jobs that are done, running and failed."""
     changes = {"frames": "1-6", "sampling": {"method": "bidirectional"}, "state": {"carry": False, "keep": "last"}}

@@ -22,6 +22,12 @@ def what_is_typed_beats_environment_and_files(programs, folder):
     check_says(desk.baton("job", "list", **inside, BATON_KEY="").stderr, "file://here")
     check_says(desk.baton("job", "list", **inside, BATON_KEY="environment.key").stderr, "environment.key")
     check_says(desk.baton("job", "list", "--key", "typed.key", **inside, BATON_KEY="environment.key").stderr, "typed.key")
+    # What is typed may rule out what is not.
+    check_says(desk.baton("job", "list", "--insecure", **inside, BATON_KEY="environment.key").stderr, "file://here")
+    # What stands in for other commands' options is none of this one's.
+    check_says(desk.baton("job", "list", **inside, BATON_STORE_LIMIT="abc").stderr, "file.key")
+    check_equal(desk.baton("view", "x", BATON_STORE_LIMIT="abc").returncode, desk.baton("view", "x").returncode, "of another command")
+    check_says(desk.baton("render", "x", BATON_STORE_LIMIT="abc").stderr, "--store-limit")
     shown = json.loads(desk.baton("config", "--json", **inside, BATON_KEY="environment.key").stdout)
     found = {setting["name"]: (setting["value"], setting["from"]) for setting in shown["settings"]}
     check_equal(found["BATON_COORDINATOR"], ("file://here", f"{conf}:3"), "of the file")

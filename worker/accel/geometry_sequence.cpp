@@ -1,7 +1,10 @@
 #include "worker/accel/geometry_sequence.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "common/base/trace.h"
 #include "common/job/motion.h"
 
 namespace baton {
@@ -16,8 +19,10 @@ Result<std::shared_ptr<const FrameGeometry>> GeometrySequence::at(Step step) {
   // A job in which nothing moves has one frame for all.
   const FrameIndex name = moves(job_) ? timeline_.frame_of(step) : FrameIndex(0);
   if (auto found = frames_.find(name)) return found;  // while another frame is built
-  const std::lock_guard lock(placing_);
+  const std::string what = fmt::format("geometry of frame {}", job_.frames[name.index()]);
+  const std::unique_lock lock = lock_traced(placing_, what);
   if (auto found = frames_.find(name)) return found;
+  const Span span(SpanKind::make, what);
 
   // The placed ray tracer refers to the instances beside it.
   auto frame = std::make_shared<FrameGeometry>();

@@ -1,9 +1,9 @@
 #include "worker/exchange/extra_samples.h"
 
+#include "common/base/cpu_clock.h"
 #include "common/base/poison.h"
 #include "worker/exchange/energy_exchange.h"
 #include "worker/method/weighted/populations.h"
-#include "worker/pass/cpu_clock.h"
 #include "worker/pass/primary.h"
 #include "worker/sampling/folds.h"
 

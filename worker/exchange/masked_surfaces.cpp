@@ -1,6 +1,6 @@
 #include "worker/exchange/masked_surfaces.h"
 
-#include "worker/pass/cpu_clock.h"
+#include "common/base/cpu_clock.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/site_rays.h"
 

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
+#include "common/base/cpu_clock.h"
 #include "worker/exchange/extra_samples.h"
 #include "worker/exchange/traced_exchange.h"
-#include "worker/pass/cpu_clock.h"
 #include "worker/sampling/folds.h"
 
 namespace baton {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "common/base/cpu_clock.h"
 #include "common/base/poison.h"
-#include "worker/pass/cpu_clock.h"
 #include "worker/sampling/folds.h"
 
 namespace baton {

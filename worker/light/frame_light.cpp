@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/advice/known_limits.h"
+#include "common/base/trace.h"
 #include "common/math/octahedral.h"
 #include "common/scene/map/map_report.h"
 
@@ -120,12 +121,19 @@ Result<Environment> LightSequence::seen_environment(const Environment& now) {
 }
 
 Result<std::shared_ptr<const FrameLight>> LightSequence::at(Step step, Round round) {
-  const std::lock_guard lock(mutex_);
   const FrameSpec& frame = frames_[step.index()];
+  const std::string what =
+      round == kProbeRound
+          ? fmt::format("light of the probes of frame {}", frame.number)
+          : fmt::format("light of frame {}, round {}", frame.number, frame.round_of_frame(round));
+  const std::unique_lock lock = lock_traced(mutex_, what);
   const bool is_first = round == Round(0);
   const Step step_before = is_first ? std::max(step - 1, Step(0)) : step;
   const FrameSpec& frame_before = frames_[step_before.index()];
   auto light = std::make_shared<FrameLight>();
+  std::optional<Span> making;
+  light->presampled = presampled_.find({step, round});
+  if (light->presampled == nullptr) making.emplace(SpanKind::make, what);
   BATON_ASSIGN(light->now, environment(frame));
   BATON_ASSIGN(light->before, environment(frame_before));
   BATON_ASSIGN(light->seen, seen_environment(light->now));
@@ -140,7 +148,6 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(Step step, Round rou
     light->turn = turn_between(light->before, light->now);
   if (is_first) note(frame);
   const bool is_seen = round >= Round(0) && round != kProbeRound;
-  light->presampled = presampled_.find({step, round});
   if (light->presampled == nullptr) {
     light->presampled = presampled_.insert(
         {step, round},

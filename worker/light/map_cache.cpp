@@ -1,6 +1,7 @@
 #include "worker/light/map_cache.h"
 
 #include "common/base/patiently.h"
+#include "common/base/trace.h"
 #include "common/scene/map/map_reduction.h"
 
 namespace baton {
@@ -12,6 +13,7 @@ Result<MapCache::MapPtr> MapCache::get(const std::string& path, const Environmen
                 hidden, capped_share};
   const std::lock_guard lock(reading_);
   if (MapPtr found = maps_.find(key)) return found;
+  const Span span(SpanKind::read, path);
   const auto read = [&]() -> Result<RgbImage> {
     BATON_ASSIGN(RgbImage image, read_(path));
     BATON_TRY(is_unchanged_(path));

@@ -1,8 +1,8 @@
 #include "worker/pass/pixel_starts.h"
 
+#include "common/base/cpu_clock.h"
 #include "common/base/poison.h"
 #include "worker/pass/catcher.h"
-#include "worker/pass/cpu_clock.h"
 
 namespace baton {
 

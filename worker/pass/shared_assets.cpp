@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "common/base/trace.h"
+
 namespace baton {
 
 Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job,
@@ -12,10 +14,16 @@ Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& jo
                                                                std::uint64_t max_scene_bytes,
                                                                FilesBeside beside) {
   auto assets = std::make_shared<SharedAssets>();
-  BATON_ASSIGN(assets->scene, load_scene(job, beside, max_scene_bytes));
+  {
+    const Span span(SpanKind::read, "meshes, materials and textures");
+    BATON_ASSIGN(assets->scene, load_scene(job, beside, max_scene_bytes));
+  }
   const std::uint64_t scene_bytes = assets->scene.size_bytes();
   const std::uint64_t room = max_scene_bytes - std::min(max_scene_bytes, scene_bytes);
-  Result<std::unique_ptr<Accel>> accel = Accel::build(assets->scene, {.max_bytes = room});
+  Result<std::unique_ptr<Accel>> accel = [&] {
+    const Span span(SpanKind::make, "hierarchies");
+    return Accel::build(assets->scene, {.max_bytes = room});
+  }();
   if (!accel && accel.error().kind == ErrorKind::bad_input) {
     return Error{ErrorKind::bad_input,
                  fmt::format("the scene does not fit into memory: meshes and textures take {} MiB, "

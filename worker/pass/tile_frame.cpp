@@ -4,9 +4,9 @@
 #include <bit>
 #include <utility>
 
+#include "common/base/cpu_clock.h"
 #include "common/base/poison.h"
 #include "common/job/aov.h"
-#include "worker/pass/cpu_clock.h"
 #include "worker/pass/pixel_books.h"
 
 namespace baton {

@@ -9,9 +9,10 @@
 #include <optional>
 #include <utility>
 
+#include "common/base/cpu_clock.h"
+#include "common/base/trace.h"
 #include "common/job/motion.h"
 #include "worker/pass/adaptive_rounds.h"
-#include "worker/pass/cpu_clock.h"
 #include "worker/pass/fine_sites.h"
 #include "worker/pass/geometry_planes.h"
 #include "worker/pass/pixel_order.h"
@@ -307,6 +308,8 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
   for (Step step = run.steps.first; step <= run.steps.last; ++step) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
     const FrameSpec& frame = context.frames[step.index()];
+    Span span(SpanKind::frame, fmt::format("frame {}", frame.number));
+    span.add("step", step.value());
     BATON_ASSIGN(FilmTile film, walk.render(frame, previous));
     if (const Sweep sweep = timeline.sweep_of(step); sweep > Sweep(0)) {
       const Step earlier_step = timeline.step_of(timeline.frame_of(step), sweep - 1);

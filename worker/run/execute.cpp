@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "common/base/cpu_clock.h"
 #include "common/base/file_stamp.h"
 #include "common/base/patiently.h"
+#include "common/base/trace.h"
 #include "common/image/film_tile.h"
 #include "common/job/motion.h"
 #include "common/job/plan/sequence.h"
@@ -11,7 +13,6 @@
 #include "common/state/join_states.h"
 #include "common/state/sample_state.h"
 #include "worker/exchange/second_pass.h"
-#include "worker/pass/cpu_clock.h"
 #include "worker/pass/render_context.h"
 #include "worker/pass/shared_assets.h"
 #include "worker/run/frame_output.h"
@@ -30,9 +31,11 @@ class PatientStore {
   PatientStore(BlobStore& store, const std::stop_token& stop) : store_(store), stop_(stop) {}
 
   Result<Bytes> get(const Digest& digest) const {
+    const Span span(SpanKind::read, "a blob");
     return patiently([&] { return store_.get(digest); }, stop_);
   }
   Result<BlobRef> put(BlobKind kind, Step step, std::int32_t tile, const Bytes& bytes) const {
+    const Span span(SpanKind::write, std::string(blob_kind_name(kind)));
     BATON_ASSIGN(const Digest digest, patiently([&] { return store_.put(bytes); }, stop_));
     return BlobRef{kind, step.value(), tile, digest, bytes.size()};
   }

@@ -9,6 +9,7 @@
 #include "common/base/build.h"
 #include "common/base/files.h"
 #include "common/base/patiently.h"
+#include "common/base/trace.h"
 #include "common/base/version.h"
 #include "common/image/cryptomatte.h"
 #include "common/image/frame_seal.h"
@@ -188,6 +189,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
   const std::filesystem::path path = frame_path(job, frame);
   const FrameNumber number = job.frames.at(frame.index());
   const Camera camera(camera_at(job, number.value()), job.image.width, job.image.height);
+  std::optional<Span> encoding(std::in_place, SpanKind::write, "encoding");
   BATON_ASSIGN(Bytes bytes,
                encode_exr(path.string(), image,
                           {.half_float = job.output.pixel_type == PixelType::half_float,
@@ -202,6 +204,8 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
                            .display_window = job.image.whole()}));
   seal_frame(path.filename().string(), bytes);
   const Digest made = digest_of(bytes);
+  encoding.reset();
+  const Span span(SpanKind::write, "file, read back");
   const auto check = [&](const std::filesystem::path& temporary) -> Result<bool> {
     BATON_TRY(verify_frame(temporary, image, frame.value()));
     return may_replace ? may_replace(made) : true;

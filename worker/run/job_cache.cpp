@@ -8,6 +8,7 @@
 #include "common/base/file_stamp.h"
 #include "common/base/limits.h"
 #include "common/base/patiently.h"
+#include "common/base/trace.h"
 #include "common/job/plan/estimate.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
@@ -18,6 +19,9 @@
 
 namespace baton {
 namespace {
+
+/// In traces.
+constexpr const char* kLoading = "loading the job";
 
 /// What the tiles in work and a frame that is assembled take, about.
 std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
@@ -116,7 +120,10 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
   }
 
   // What changes while it is read is looked at again, and then told of.
-  BATON_ASSIGN(loaded->assets, look_at(here.assets));
+  {
+    const Span span(SpanKind::read, "digests of files");
+    BATON_ASSIGN(loaded->assets, look_at(here.assets));
+  }
   BATON_ASSIGN(const std::uint64_t room, room_for_scene(here.job, machine));
   BATON_ASSIGN(const auto assets, patiently([&] {
                  return shelf.get(here.job, loaded->assets, machine.memory, room);
@@ -174,12 +181,16 @@ LoadedJobPtr JobEntry::loaded() const {
 Result<LoadedJobPtr> JobEntry::load(const std::stop_token& stop) {
   // Wait until there is something to do or to return.
   std::unique_lock lock(mutex_);
-  const bool ready =
-      changed_.wait(lock, stop, [this] { return result_ || (document_ && !loading_); });
+  const auto is_ready = [this] { return result_ || (document_ && !loading_); };
+  const bool ready = is_ready() || [&] {
+    const Span wait(SpanKind::wait, kLoading);
+    return changed_.wait(lock, stop, is_ready);
+  }();
   if (!ready) return Error{ErrorKind::cancelled, "stopped while waiting for the job to load"};
   if (result_) return *result_;
 
   // Load without the lock: it may take long, and others only wait.
+  const Span span(SpanKind::make, kLoading);
   loading_ = true;
   lock.unlock();
   Result<LoadedJobPtr> result = loader_(*document_);

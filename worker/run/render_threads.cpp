@@ -1,14 +1,26 @@
 #include "worker/run/render_threads.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+
+#include "common/base/trace.h"
 
 namespace baton {
 
 RenderThreads::RenderThreads(int num_threads, Execute execute, Publish publish,
                              std::function<void()> wake)
     : execute_(std::move(execute)), publish_(std::move(publish)), wake_(std::move(wake)) {
-  for (int i = 0; i < num_threads; ++i) threads_.emplace_back([this] { work(); });
-  threads_.emplace_back([this] { publish_executed(); });
+  for (int i = 0; i < num_threads; ++i) {
+    threads_.emplace_back([this, i] {
+      name_traced_thread(fmt::format("render {}", i + 1));
+      work();
+    });
+  }
+  threads_.emplace_back([this] {
+    name_traced_thread("publisher");
+    publish_executed();
+  });
 }
 
 RenderThreads::~RenderThreads() {

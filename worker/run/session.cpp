@@ -120,6 +120,7 @@ void Session::on(const HeldPacked& event, TimePoint, Actions& actions) {
 
 void Session::on(const DrainRequested&, TimePoint now, Actions& actions) {
   draining_ = true;
+  next_heartbeat_ = now;  // which says so
   if (options_.drain > 0s) {
     const TimePoint end = now + options_.drain;
     give_back_at_ = std::min(give_back_at_.value_or(end), end);
@@ -164,7 +165,7 @@ void Session::on(const Tick&, TimePoint now, Actions& actions) {
       if (now - report.sent >= kUnconfirmedHeartbeats * heartbeat_)
         send_report(report, now, actions);
     }
-    actions.push_back(SendMessage{Heartbeat{leases_in_hand()}});
+    actions.push_back(SendMessage{Heartbeat{leases_in_hand(), draining_}});
     for (const Digest& job : documents_missing_) {
       actions.push_back(SendMessage{JobDocumentRequest{job}});
     }

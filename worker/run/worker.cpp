@@ -20,6 +20,7 @@
 #include "common/base/limits.h"
 #include "common/base/log.h"
 #include "common/base/patiently.h"
+#include "common/base/trace.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/plan/task_place.h"
 #include "common/job/text/job_json.h"
@@ -33,6 +34,7 @@
 #include "worker/run/renderer.h"
 #include "worker/run/replay.h"
 #include "worker/run/session.h"
+#include "worker/run/task_trace.h"
 #include "worker/run/task_watch.h"
 
 namespace baton {
@@ -129,7 +131,8 @@ constexpr std::chrono::seconds kLoadPatience{limits::kMaxSecondsToLoad};
 /// Executes a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
 Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token& stop,
-                                  std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch) {
+                                  std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch,
+                                  TaskSpan& span) {
   // The time that a task may take does not include the loading of its job, which has its own.
   LoadedJobPtr loaded;
   {
@@ -139,6 +142,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
     if (!result) return loading_failed(task, result.error());
     loaded = std::move(result).value();
   }
+  span.name(*loaded, task.grant);
   if (!loaded->unseen.empty()) {
     notes.report(loaded->digest, {loaded->unseen});
     return TaskResult{.made = {}, .unseen = loaded->unseen};
@@ -188,7 +192,11 @@ Status publish_queued(std::span<const QueuedTask> tasks, TaskWatch& watch) {
     marks.emplace_back(watch, task.grant.lease, deadline);
     stores.insert(task.store);
   }
+  const auto begin = std::chrono::steady_clock::now();
   for (const auto& store : stores) BATON_TRY(store->sync());
+  const auto end = std::chrono::steady_clock::now();
+  for (const QueuedTask& task : tasks)
+    record_span(SpanKind::publish, "publish", begin, end, traced_task(task.grant.lease));
   return {};
 }
 
@@ -224,7 +232,10 @@ class Worker {
             options.num_threads,
             [this](const QueuedTask& task, const std::stop_token& stop,
                    std::vector<BlobRef>& left) {
-              return execute_queued(task, stop, left, notes_, watch_);
+              TaskSpan span(task.grant);
+              Result<TaskResult> result = execute_queued(task, stop, left, notes_, watch_, span);
+              span.end(result);
+              return result;
             },
             [this](std::span<const QueuedTask> tasks) { return publish_queued(tasks, watch_); },
             [this] { channel_.wake(); }) {}
@@ -323,6 +334,8 @@ class Worker {
   }
 
   void perform(SendMessage& action) {
+    if (auto* const beat = std::get_if<Heartbeat>(&action.message))
+      beat->memory_bytes = resident_bytes();
     if (!channel_.send(action.message)) spdlog::warn("the queue to the coordinator is full");
   }
   void perform(UseStore& action) {
@@ -343,6 +356,8 @@ class Worker {
       const std::filesystem::path file = worker_log(folder.parent_path(), worker_id_);
       if (const Status opened = log_to_file(file); !opened)
         spdlog::warn("no log for `baton job log`: {}", opened.error().message);
+      if (const Status opened = trace_to_file(trace_beside(file), worker_id_); !opened)
+        spdlog::warn("no trace for `baton job trace`: {}", opened.error().message);
     }
     spdlog::info("the coordinator has answered, blobs are in {}", folder.string());
   }
@@ -446,8 +461,11 @@ ExitCode run_worker(const WorkerOptions& options, const std::atomic<int>& signal
     spdlog::error("{}", channel.error().message);
     return exit_code_of(channel.error().kind);
   }
-  Worker worker(std::move(channel).value(), options);
-  return worker.run(signals);
+  std::optional<Worker> worker(std::in_place, std::move(channel).value(), options);
+  const ExitCode code = worker->run(signals);
+  worker.reset();  // ends its threads
+  end_trace();
+  return code;
 }
 
 }  // namespace baton

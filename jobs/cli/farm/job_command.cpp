@@ -19,6 +19,7 @@
 #include "jobs/cli/farm/job_picture.h"
 #include "jobs/cli/farm/job_questions.h"
 #include "jobs/cli/farm/job_requeue.h"
+#include "jobs/cli/farm/job_trace.h"
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/json_text.h"
@@ -317,9 +318,8 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   add_from_frame_option(*hand_in, submission->from_frame);
   add_list_command(*job, code);
   add("show", "One job: progress, statistics, failures", "ID", show);
-  add_job_questions(*job, code);
-  add_job_log(*job, code);
-  add_job_picture(*job, code);
+  for (const auto add_reader : {add_job_questions, add_job_log, add_job_trace, add_job_picture})
+    add_reader(*job, code);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
       change<PauseJob>);
   add("resume", "Goes on with a paused job", "ID", change<ResumeJob>);

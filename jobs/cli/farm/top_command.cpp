@@ -78,9 +78,10 @@ std::vector<std::string> screen_lines(const CoordinatorLink& link, JobList list)
 /// Over what is on the terminal, as much of it as there is room for.
 void show(std::vector<std::string> lines, bool is_terminal) {
   const ScreenSize size = screen_size();
-  if (lines.size() + 1 > size.lines) {
-    const std::size_t left_out = lines.size() + 2 - size.lines;
-    lines.resize(size.lines - 2);
+  const std::size_t room = std::max<std::size_t>(size.lines, 3) - 2;
+  if (lines.size() > room + 1) {
+    const std::size_t left_out = lines.size() - room;
+    lines.resize(room);
     lines.push_back(fmt::format("and {} lines more", left_out));
   }
   if (is_terminal) fmt::print("{}", kHome);

@@ -61,7 +61,7 @@ void WorkerLogReader::read_file(const fs::path& file, std::vector<WorkerLogLine>
     std::optional<WorkerLogLine> parsed = parse_line(line);
     is_wanted = parsed && parsed->text.starts_with(wanted_);
     if (!is_wanted) continue;
-    parsed->worker = name.substr(0, name.find(".log"));
+    parsed->worker = name.substr(0, name.find('.'));
     lines.push_back(std::move(*parsed));
   }
 }

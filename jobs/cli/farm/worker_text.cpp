@@ -28,6 +28,7 @@ std::string worker_lines(const WorkerSummary& worker) {
                                  worker.worker_id, worker_activity_name(worker.activity),
                                  worker.num_threads, worker.tasks.size(),
                                  duration_text(worker.silent_s), worker.renderer, worker.host);
+  if (worker.memory_bytes > 0) text += fmt::format("  {} MiB", worker.memory_bytes >> 20);
   for (const TaskInHand& task : worker.tasks)
     text += fmt::format("\n  job {}  {}  for {}{}", task.job.short_hex(), place_text(task.task),
                         task_time_text(task.seconds), usual_text(task.usual));
@@ -58,6 +59,7 @@ ordered_json worker_json(const WorkerSummary& worker) {
           {"draining", worker.is_draining},
           {"held", worker.is_held},
           {"secondsSilent", worker.silent_s},
+          {"memoryBytes", worker.memory_bytes},
           {"build", worker.build},
           {"renderer", worker.renderer},
           {"tasks", std::move(tasks)},

@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <chrono>
+
 #include "common/base/machine_memory.h"
+#include "common/base/trace.h"
+#include "common/store/worker_logs.h"
 #include "jobs/cli/check/asset_report.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
@@ -10,9 +14,12 @@
 #include "jobs/cli/render/render_watch.h"
 #include "jobs/cli/say.h"
 #include "jobs/cli/settle_method.h"
+#include "jobs/trace/trace_file.h"
 
 namespace baton {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 /// Says how the job ended; one that failed because its files cannot be loaded is bad input.
 ExitCode exit_code_of(const JobSpec& job, JobStatus status, std::uint64_t memory_mib) {
@@ -22,7 +29,44 @@ ExitCode exit_code_of(const JobSpec& job, JobStatus status, std::uint64_t memory
   return assets ? ExitCode::failed : exit_code_of(assets.error().kind);
 }
 
+/// What all threads of a farm and of this process do, until it is written to a file.
+class FarmTrace {
+ public:
+  /// file: empty: nothing is done.
+  explicit FarmTrace(std::string file) : file_(std::move(file)) {}
+
+  /// Once the farm is there. loaded, started: when the job was, and the farm.
+  Status begin(const std::filesystem::path& work_folder, Clock::time_point loaded) {
+    if (file_.empty()) return {};
+    logs_ = worker_logs(work_folder);
+    std::error_code error;
+    std::filesystem::create_directories(logs_, error);
+    BATON_TRY(trace_to_file(logs_ / "baton-render.trace", "baton render"));
+    record_span(SpanKind::phase, "the job and its files", begin_, loaded, "");
+    record_span(SpanKind::phase, "starting the farm", loaded, Clock::now(), "");
+    return {};
+  }
+  /// Once it has ended.
+  Status write() const {
+    if (logs_.empty()) return {};
+    end_trace();
+    Trace trace = read_worker_traces(logs_);
+    keep_since(trace, since_1970_s_);
+    BATON_TRY(write_trace(file_, trace));
+    tell("trace      {}; `baton trace` says what is in it\n", file_);
+    return {};
+  }
+
+ private:
+  const std::string file_;
+  const Clock::time_point begin_ = Clock::now();
+  const double since_1970_s_ =
+      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  std::filesystem::path logs_;
+};
+
 Result<ExitCode> run_render(const RenderOptions& options) {
+  FarmTrace trace(options.trace);
   BATON_ASSIGN(JobSpec job, load_settled(options.job));
   BATON_TRY(begin_at(job, options.from_frame));
   BATON_TRY(check_out(options, job));
@@ -31,7 +75,9 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   BATON_TRY(settle_method(job, farm));
 
   const SignalWait signals;
+  const Clock::time_point loaded = Clock::now();
   BATON_ASSIGN(RenderSession session, RenderSession::start(options, farm, signals));
+  BATON_TRY(trace.begin(farm.work_directory, loaded));
   const Result<std::optional<JobStatus>> rendered =
       session.render(job, options.restart || options.from_frame);
   if (!rendered) {
@@ -45,6 +91,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   }
   if (!status) spdlog::info("stopping; finished work is kept");
   session.stop();
+  BATON_TRY(trace.write());
   if (status) return exit_code_of(job, *status, options.memory_mib);
 
   std::string place = options.work_directory.empty() ? "" : " --work-dir " + options.work_directory;
@@ -88,6 +135,10 @@ void add_render_command(CLI::App& app, ExitCode& code) {
   add_from_frame_option(*command, options->from_frame);
   command->add_flag("--keep-running", options->keep_running,
                     "keep coordinator and workers until Ctrl-C");
+  command
+      ->add_option("--trace", options->trace,
+                   "writes what each thread did, for `baton trace` and Perfetto")
+      ->excludes("--watch");
   command->add_flag("--json", options->json, "the result for machines");
   command->footer(
       "Examples:\n"

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "common/base/limits.h"
+#include "common/base/trace.h"
 #include "common/job/plan/sequence.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
@@ -143,15 +144,38 @@ Status RenderSession::await_worker() {
   return {};
 }
 
+/// In a farm of its own nobody else waits for a job that was interrupted: what writes into the
+/// folder under another name ends, and leaves what it has done.
+Status RenderSession::end_namesakes(const JobSpec& job) {
+  BATON_ASSIGN(const std::optional<JobList> list,
+               ask_farm<JobList>(farm_, client_, signals_, ListJobs{}));
+  for (const ListedJob& other : list ? list->jobs : std::vector<ListedJob>()) {
+    std::error_code error;
+    const bool is_here =
+        other.summary.output_directory == job.output.directory ||
+        fs::equivalent(other.summary.output_directory, job.output.directory, error);
+    if (!is_here || other.summary.name == job.name || !is_open(other.summary.status)) continue;
+    tell("job '{}', which was interrupted, makes way\n", other.summary.name);
+    BATON_ASSIGN(const std::optional<ShownJob> ended,
+                 ask_farm<ShownJob>(farm_, client_, signals_, CancelJob{other.identity.id.hex()}));
+    if (!ended) return {};
+  }
+  return {};
+}
+
 /// Submits the job and follows it to its end.
 Result<std::optional<ShownJob>> RenderSession::render_document(
     const JobSpec& job, bool restart, FrameSheet& sheet, const std::function<bool()>& interrupted) {
+  std::optional<Span> phase(std::in_place, SpanKind::phase, "digests of files");
   BATON_ASSIGN(const std::string document, make_job_document(job));
+  if (farm_.is_own()) BATON_TRY(end_namesakes(job));
   // What --restart begins again depends on who renders.
   if (restart && farm_.is_own()) BATON_TRY(await_worker());
   for (;;) {
+    phase.emplace(SpanKind::phase, "submission");
     BATON_ASSIGN(const std::optional<JobAccepted> accepted,
                  ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{document, restart}));
+    phase.emplace(SpanKind::phase, "rendering");
     if (!accepted) return std::optional<ShownJob>();
     tell("{}", accepted->plan);
     BATON_ASSIGN(std::optional<ShownJob> shown,
@@ -176,7 +200,10 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
   } else {
     print_result(job, shown->detail, std::chrono::duration<double>(Clock::now() - start).count());
   }
-  write_sheet(sheet, options_.display, options_.json);
+  {
+    const Span phase(SpanKind::phase, "contact sheet");
+    write_sheet(sheet, options_.display, options_.json);
+  }
   if (status == JobStatus::done) BATON_TRY(write_png_of(job));
   if (status == JobStatus::failed) print_failures(shown->detail);
   if (shown->lacks_renderer && farm_.is_own())
@@ -187,6 +214,11 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
   std::fflush(stdout);
   if (exit_code_of(shown->detail) == ExitCode::io) return Error{ErrorKind::io, shown->detail.waits};
   return std::optional(status);
+}
+
+void RenderSession::stop() {
+  const Span phase(SpanKind::phase, "stopping the farm");
+  farm_.stop();
 }
 
 Status RenderSession::write_png_of(const JobSpec& job) const {

@@ -28,6 +28,7 @@ struct RenderOptions {
   bool restart = false;
   std::optional<FrameNumber> from_frame;
   bool keep_running = false;
+  std::string trace;  ///< for what threads did; empty: none
   bool json = false;
 };
 
@@ -63,10 +64,11 @@ class RenderSession {
   /// As LocalFarm's.
   const std::string& endpoint() const { return farm_.endpoint(); }
   Status tend() { return farm_.tend(); }
-  void stop() { farm_.stop(); }
+  void stop();
 
  private:
   Status await_worker();
+  Status end_namesakes(const JobSpec& job);
   Result<std::optional<ShownJob>> render_document(const JobSpec& job, bool restart,
                                                   class FrameSheet& sheet,
                                                   const std::function<bool()>& interrupted);

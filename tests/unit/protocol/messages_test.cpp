@@ -60,7 +60,7 @@ const std::vector<Message>& examples() {
   static const std::vector<Message> messages{
       WorkerHello{"w", "h\xc3\xb6st", 77, 1, 2, "baton 1", "AVX2", {kLease, kLease}},
       LeaseRequest{7},
-      Heartbeat{{kLease}},
+      Heartbeat{{kLease}, true, 12345},
       TaskDone{kLease, {{kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}}, {5, 6, 7}, {"odd", ""}},
       TaskFailed{kLease, "no", true, true},
       JobDocumentRequest{{1, 2}},
@@ -86,6 +86,7 @@ const std::vector<Message>& examples() {
                 {{{9}, kPlace, 1.5, kUsual}},
                 true,
                 true,
+                34567,
                 WorkerActivity::draining,
                 2.5,
                 "baton 1",
@@ -166,13 +167,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 19);
+  static_assert(kProtocolVersion == 20);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "b6c348cfe9d3c904883ae59a044d1b0d");
+  EXPECT_EQ(digest_of(all).hex(), "8e0f849b1a6518426ca57890c0aa72f0");
 }
 
 // Names are one line, what is told may be several; documents and paths are bytes.
@@ -206,7 +207,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x13\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x14\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -247,12 +248,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{20};
+  frames[0][5] = std::byte{kProtocolVersion + 1};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 20, this program speaks 19"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 21, this program speaks 20"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

@@ -269,6 +269,10 @@ TEST(Forecast, SaysNothingOfWhatIsNotKnownYet) {
   EXPECT_LE(eta.likely_s, eta.late_s);
   // The thread whose tile ends last writes 12 frames of a second before its next 12 seconds.
   EXPECT_NEAR(eta.likely_s, 38, 4);
+  // Of eight threads two are on machines that see the job.
+  const Eta narrow =
+      forecast({{.graph = graph, .book = book, .times = times, .most_at_once = 2}}, 8)[0];
+  EXPECT_NEAR(narrow.likely_s, 60, 6);
 }
 
 }  // namespace

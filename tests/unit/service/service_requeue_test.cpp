@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include "common/store/frame_locks.h"
 #include "tests/unit/service/fake_farm.h"
 
 /// Frames that are rendered once more because somebody wants it, and where a job's frames are seen.
@@ -17,6 +18,11 @@ struct RequeueTest : ServiceTest {
   JobAccepted submit(const std::string& endpoint, std::vector<FrameNumber> again = {}) {
     return ask<JobAccepted>(endpoint, SubmitJob{document, false, true, std::move(again)});
   }
+  /// Until the coordinator has taken note of it.
+  static void do_one_task(FakeWorker& worker) {
+    const LeaseId lease = worker.do_one_task();
+    EXPECT_EQ(worker.expect<ReportReceived>().lease, lease);
+  }
   /// Does tasks until the job has ended, also those that its last look at the frames brings;
   /// returns how many there were.
   int finish(const std::string& endpoint, FakeWorker& worker, const Digest& id) {
@@ -33,7 +39,7 @@ struct RequeueTest : ServiceTest {
         EXPECT_EQ(job_now.summary.status, JobStatus::done);
         break;
       }
-      worker.do_one_task();
+      do_one_task(worker);
     }
     return count;
   }
@@ -102,7 +108,7 @@ TEST_F(RequeueTest, AnOpenJobDoesTheSameAndAPausedOneStaysPaused) {
   auto& [service, endpoint, worker, id] = farm;
   EXPECT_EQ(plan(endpoint, {FrameNumber(1)}).num_tasks, 0u) << "nothing is done";
   EXPECT_THAT(plan(endpoint, {FrameNumber(1)}).plan, HasSubstr("frame 1 is not written yet"));
-  while (show(endpoint, id).frames_done.size() < 2) worker.do_one_task();
+  while (show(endpoint, id).frames_done.size() < 2) do_one_task(worker);
   const std::uint64_t done = show(endpoint, id).summary.tasks_done;
   const RequeuePlan wanted = plan(endpoint, {FrameNumber(2)});
   EXPECT_THAT(wanted.plan, HasSubstr("frame 2 is rendered again, from the first frame on"));
@@ -154,7 +160,7 @@ TEST_F(RequeueTest, AFrameThatWasLockedMeanwhileIsTheJobsAgain) {
 TEST_F(RequeueTest, ACancelledJobSaysThatItGoesOn) {
   Busy farm(*this);
   auto& [service, endpoint, worker, id] = farm;
-  while (show(endpoint, id).frames_done.size() < 2) worker.do_one_task();
+  while (show(endpoint, id).frames_done.size() < 2) do_one_task(worker);
   ask<ShownJob>(endpoint, CancelJob{"test"});
   const RequeuePlan wanted = plan(endpoint, {FrameNumber(1)});
   EXPECT_THAT(wanted.plan,
@@ -199,7 +205,7 @@ TEST_F(RequeueTest, APictureIsTheLastFrameOrTheTilesOfOneInWork) {
   EXPECT_TRUE(BlobStore::open(tiles.store_directory)->contains(tiles.films[0].digest));
   EXPECT_THAT(refused(endpoint, last).message, HasSubstr("no frame is written yet"));
 
-  while (show(endpoint, id).frames_done.size() < 2) worker.do_one_task();
+  while (show(endpoint, id).frames_done.size() < 2) do_one_task(worker);
   EXPECT_EQ(ask<PictureSource>(endpoint, last).frame, FrameNumber(2));
   EXPECT_EQ(ask<PictureSource>(endpoint, AskPicture{"test", true, FrameNumber(1)}).file,
             frame_path(job, FrameIndex(0)).string());
@@ -212,6 +218,130 @@ TEST_F(RequeueTest, APictureIsTheLastFrameOrTheTilesOfOneInWork) {
 }
 
 // When a job will be done is known as soon as the coordinator is back.
+// What a task made before it was opened again is known to every coordinator, until somebody begins
+// the job again.
+TEST_F(RequeueTest, WhatComesOutOtherwiseIsToldWhateverCameBetween) {
+  enum class Between { nothing, restart, cancel_and_retry, retry_and_restart };
+  for (const Between between : {Between::nothing, Between::restart, Between::cancel_and_retry,
+                                Between::retry_and_restart}) {
+    options.work_dir = folder / std::to_string(static_cast<int>(between));
+    job.output.directory = (options.work_dir / "frames").string();
+    document = make_job_document(job).value();
+    std::optional<RunningService> service(std::in_place, options);
+    Digest id;
+    {
+      FakeWorker worker(service->endpoint(), store(), job);
+      worker.hello();
+      id = ask<JobAccepted>(service->endpoint(), SubmitJob{document}).version;
+      finish(service->endpoint(), worker, id);
+    }
+    submit(service->endpoint(), {FrameNumber(3)});
+    const bool is_retried =
+        between == Between::cancel_and_retry || between == Between::retry_and_restart;
+    if (is_retried) {
+      ask<ShownJob>(service->endpoint(), CancelJob{"test"});
+      submit(service->endpoint());
+    }
+    if (between == Between::restart || between == Between::retry_and_restart)
+      service.emplace(options);
+
+    JobSpec other = job;
+    ++other.seed;
+    FakeWorker evil(service->endpoint(), store(), other, "evil");
+    evil.hello();
+    evil.expect<WorkerWelcome>();
+    while (!HasFailure() && show(service->endpoint(), id).summary.status == JobStatus::running &&
+           show(service->endpoint(), id).summary.tasks_done < kNumTasks)
+      do_one_task(evil);
+    const JobDetail job_now = show_end(service->endpoint(), id);
+    EXPECT_EQ(job_now.summary.status, JobStatus::paused) << static_cast<int>(between);
+    EXPECT_THAT(job_now.waits, HasSubstr("evil")) << static_cast<int>(between);
+  }
+}
+
+// What a folder says in the place of Baton's marks is that folder's matter.
+TEST_F(RequeueTest, WhateverStandsInThePlaceOfALockFileEndsNoCoordinator) {
+  for (const bool is_link : {false, true}) {
+    options.work_dir = folder / (is_link ? "link" : "folder");
+    job.output.directory = (folder / (is_link ? "beside link" : "beside folder")).string();
+    document = make_job_document(job).value();
+    Busy farm(*this);
+    const std::string& endpoint = farm.endpoint;
+    finish(endpoint, farm.worker, farm.id);
+    ask<ShownJob>(endpoint, LockFrames{"test", {FrameNumber(2)}});
+    const fs::path file =
+        lock_folder(job.output.directory) / show_identity(endpoint, "test").id.hex();
+    ASSERT_TRUE(fs::remove(file));
+    if (is_link) {
+      fs::create_symlink("/nowhere", file);
+    } else {
+      fs::create_directory(file);
+    }
+    {
+      ServiceOptions other = options;
+      other.work_dir = folder / "copy";
+      fs::remove_all(other.work_dir);
+      fs::copy(options.work_dir, other.work_dir, fs::copy_options::recursive);
+      const RunningService again(other);
+      EXPECT_EQ(show(again.endpoint(), farm.id).summary.status, JobStatus::done);
+    }
+    if (is_link) {
+      ask<JobAccepted>(endpoint, SubmitJob{document});
+    } else {
+      EXPECT_THAT(refused(endpoint, SubmitJob{document}).message, HasSubstr(file.string()));
+    }
+    ask<ShownJob>(endpoint, LockFrames{"test", {FrameNumber(2)}, /*off=*/true});
+    ask<JobList>(endpoint, DeleteJob{"test"});
+  }
+}
+
+TEST_F(RequeueTest, TimesAreThoseOfTheLastRendering) {
+  Busy farm(*this);
+  const std::string& endpoint = farm.endpoint;
+  finish(endpoint, farm.worker, farm.id);
+  const JobTimes times = show_identity(endpoint, "test").times;
+  std::this_thread::sleep_for(10ms);
+  submit(endpoint);
+  EXPECT_EQ(show_end(endpoint, farm.id).summary.status, JobStatus::done);
+  EXPECT_EQ(show_identity(endpoint, "test").times, times) << "nothing was rendered";
+  submit(endpoint, {FrameNumber(3)});
+  finish(endpoint, farm.worker, farm.id);
+  EXPECT_GT(show_identity(endpoint, "test").times.started_ms, times.ended_ms);
+}
+
+TEST_F(RequeueTest, WorkersSayThatTheyDrain) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  worker.say(Heartbeat{{}, /*is_draining=*/true, 5u << 20});
+  worker.expect<Heartbeat>();
+  const JobList list = ask<JobList>(service.endpoint(), ListJobs{});
+  ASSERT_THAT(list.workers, SizeIs(1));
+  EXPECT_EQ(list.workers[0].activity, WorkerActivity::draining);
+  EXPECT_EQ(list.workers[0].memory_bytes, 5u << 20);
+}
+
+// A worker that sees nothing of the job helps nobody.
+TEST_F(RequeueTest, EtasCountThoseWhoGetTasksAlone) {
+  Busy farm(*this);
+  const std::string& endpoint = farm.endpoint;
+  while (show(endpoint, farm.id).summary.tasks_done < kNumTasks - 1) do_one_task(farm.worker);
+  const auto is_known = [&] {
+    for (int beat = 0; beat < 7; ++beat) {  // what was found is told for two seconds
+      std::this_thread::sleep_for(300ms);
+      farm.worker.say(Heartbeat{});
+      farm.worker.expect<Heartbeat>();
+    }
+    return ask<ShownJob>(endpoint, ShowJob{"test"}).now.eta.is_known();
+  };
+  EXPECT_TRUE(is_known());
+  farm.worker.say(LeaseRequest{1});
+  const LeaseId lease = farm.worker.expect<LeaseGrant>().lease;
+  farm.worker.say(LeaseReturn{lease, "/frames: not here"});
+  EXPECT_FALSE(is_known()) << "the only worker is blind";
+}
+
 TEST_F(RequeueTest, EtasOutlastTheCoordinator) {
   Digest id;
   {
@@ -219,7 +349,7 @@ TEST_F(RequeueTest, EtasOutlastTheCoordinator) {
     FakeWorker worker(service.endpoint(), store(), job);
     worker.hello();
     id = submit(service.endpoint()).version;
-    while (show(service.endpoint(), id).summary.tasks_done < kNumTasks - 1) worker.do_one_task();
+    while (show(service.endpoint(), id).summary.tasks_done < kNumTasks - 1) do_one_task(worker);
   }
   const RunningService service(options);
   FakeWorker worker(service.endpoint(), store(), job);
