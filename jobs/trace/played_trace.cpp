@@ -114,10 +114,10 @@ class Dissection {
         work_end_s = span->end_s();
         work = span->name;
         is_made_here = span->kind == SpanKind::make;
-      } else if (span->kind == SpanKind::help && span->name == work) {
+      } else if (span->kind == SpanKind::help) {
         Work& of = works_[{task.task.job, span->name}];
         of.help_s += cpu_of(*span);
-        if (is_made_here) of.own_help_s += cpu_of(*span);
+        if (is_made_here && span->name == work) of.own_help_s += cpu_of(*span);
       }
       if ((span->kind == SpanKind::read || span->kind == SpanKind::write) &&
           span->start_s >= work_end_s && span->start_s >= io_end_s) {

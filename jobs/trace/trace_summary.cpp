@@ -64,6 +64,7 @@ TraceSummary summarize(const Trace& trace, const std::vector<std::size_t>& threa
   double busy_s = 0;
   struct Open {
     double task_end_s = 0, part_end_s = 0;
+    std::string waits_for;  ///< empty: the part is no wait
   };
   std::map<Thread, Open> open;
   for (const TracedSpan& span : trace.spans) {
@@ -73,17 +74,25 @@ TraceSummary summarize(const Trace& trace, const std::vector<std::size_t>& threa
     if (span.kind == SpanKind::task) {
       seen.insert(thread);
       workers.insert(span.process);
-      now = {span.end_s(), 0};
+      now = {span.end_s(), 0, {}};
       busy_s += span.seconds;
       const std::string kind = span.task.kind.empty() ? without_number(span.name) : span.task.kind;
       done[kind] += span.seconds;
       add_stretch(summary.busy_over_time, slice_s, from_s, to_s, 1);
       continue;
     }
-    // Works and waits that lie in no other, and parts that others are helped with in waits.
+    // Works and waits that lie in no other; who helps meanwhile does not wait.
+    if (span.kind == SpanKind::help && span.end_s() <= now.part_end_s && !now.waits_for.empty()) {
+      waited[now.waits_for] -= span.seconds;
+      done["helping with " + without_number(span.name)] += span.seconds;
+      busy_s += span.seconds;
+      add_stretch(summary.busy_over_time, slice_s, from_s, to_s, 1);
+      continue;
+    }
     const bool counts = span.kind == SpanKind::make || span.kind == SpanKind::wait;
     if (!counts || span.end_s() > now.task_end_s || span.start_s < now.part_end_s) continue;
     now.part_end_s = span.end_s();
+    now.waits_for = span.kind == SpanKind::wait ? without_number(span.name) : std::string();
     if (span.kind == SpanKind::make) {
       done["making " + without_number(span.name)] += span.seconds;
     } else {

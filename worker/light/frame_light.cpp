@@ -67,9 +67,10 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
           frames_in_hand(job)) {}
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key,
-                                                                     const HiddenCone& hidden) {
+                                                                     const HiddenCone& hidden,
+                                                                     const DoParts& do_parts) {
   return maps_->get(job_.environment.keys[static_cast<std::size_t>(key)].map, job_.environment,
-                    job_.sampling.mis_compensation, hidden, capped_share_);
+                    job_.sampling.mis_compensation, hidden, capped_share_, do_parts);
 }
 
 Step LightSequence::first_with_texels_of(const EnvironmentFrame& frame) const {
@@ -80,12 +81,12 @@ Step LightSequence::first_with_texels_of(const EnvironmentFrame& frame) const {
 }
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
-    const EnvironmentFrame& frame, const HiddenCone& hidden) {
-  if (frame.mix <= 0 && frame.scale == 1) return key_map(frame.map_a, hidden);
+    const EnvironmentFrame& frame, const HiddenCone& hidden, const DoParts& do_parts) {
+  if (frame.mix <= 0 && frame.scale == 1) return key_map(frame.map_a, hidden, do_parts);
   const std::pair name(first_with_texels_of(frame), hidden);
   if (auto found = mixed_maps_.find(name)) return found;
-  BATON_ASSIGN(const auto a, key_map(frame.map_a, hidden));
-  BATON_ASSIGN(const auto b, key_map(frame.map_b, hidden));
+  BATON_ASSIGN(const auto a, key_map(frame.map_a, hidden, do_parts));
+  BATON_ASSIGN(const auto b, key_map(frame.map_b, hidden, do_parts));
   if (a->width() != b->width() || a->height() != b->height()) {
     return Error{
         ErrorKind::bad_input,
@@ -94,9 +95,9 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
                     b->height(), a->width(), a->height(),
                     job_.environment.keys[static_cast<std::size_t>(frame.map_a)].map)};
   }
-  return mixed_maps_.insert(
-      name, std::make_shared<const EnvironmentMap>(*a, *b, frame.mix, frame.scale,
-                                                   job_.sampling.mis_compensation, capped_share_));
+  return mixed_maps_.insert(name, std::make_shared<const EnvironmentMap>(
+                                      *a, *b, frame.mix, frame.scale,
+                                      job_.sampling.mis_compensation, capped_share_, do_parts));
 }
 
 HiddenCone LightSequence::hidden_in(const FrameSpec& frame) {
@@ -106,8 +107,8 @@ HiddenCone LightSequence::hidden_in(const FrameSpec& frame) {
   return *cone;
 }
 
-Result<Environment> LightSequence::environment(const FrameSpec& frame) {
-  BATON_ASSIGN(auto map, mixed_map(frame.environment, hidden_in(frame)));
+Result<Environment> LightSequence::environment(const FrameSpec& frame, const DoParts& do_parts) {
+  BATON_ASSIGN(auto map, mixed_map(frame.environment, hidden_in(frame), do_parts));
   return Environment{std::move(map), frame.environment.rotation};
 }
 
@@ -120,22 +121,44 @@ Result<Environment> LightSequence::seen_environment(const Environment& now) {
   return Environment{std::move(map), now.rotation};
 }
 
+std::shared_ptr<const FrameLight> LightSequence::known(Step step, Round round) {
+  const std::lock_guard lock(known_mutex_);
+  const auto found = known_.find({step, round});
+  return found == known_.end() ? nullptr : found->second.lock();
+}
+
 Result<std::shared_ptr<const FrameLight>> LightSequence::at(Step step, Round round) {
+  if (auto light = known(step, round)) return light;
   const FrameSpec& frame = frames_[step.index()];
   const std::string what =
       round == kProbeRound
           ? fmt::format("light of the probes of frame {}", frame.number)
           : fmt::format("light of frame {}, round {}", frame.number, frame.round_of_frame(round));
-  const std::unique_lock lock = lock_traced(mutex_, what);
+  Team::Turn turn(team_, what);
+  if (auto light = known(step, round)) return light;
+  const DoParts do_parts = [&turn](std::size_t parts,
+                                   const std::function<void(std::size_t)>& part) {
+    turn.share(parts, part);
+  };
+  std::optional<Span> span;
+  if (presampled_.find({step, round}) == nullptr) span.emplace(SpanKind::make, what);
+  BATON_ASSIGN(auto light, make(step, round, do_parts));
+  const std::lock_guard lock(known_mutex_);
+  std::erase_if(known_, [](const auto& entry) { return entry.second.expired(); });
+  known_[{step, round}] = light;
+  return light;
+}
+
+/// While this thread has the turn.
+Result<std::shared_ptr<const FrameLight>> LightSequence::make(Step step, Round round,
+                                                              const DoParts& do_parts) {
+  const FrameSpec& frame = frames_[step.index()];
   const bool is_first = round == Round(0);
   const Step step_before = is_first ? std::max(step - 1, Step(0)) : step;
   const FrameSpec& frame_before = frames_[step_before.index()];
   auto light = std::make_shared<FrameLight>();
-  std::optional<Span> making;
-  light->presampled = presampled_.find({step, round});
-  if (light->presampled == nullptr) making.emplace(SpanKind::make, what);
-  BATON_ASSIGN(light->now, environment(frame));
-  BATON_ASSIGN(light->before, environment(frame_before));
+  BATON_ASSIGN(light->now, environment(frame, do_parts));
+  BATON_ASSIGN(light->before, environment(frame_before, do_parts));
   BATON_ASSIGN(light->seen, seen_environment(light->now));
   light->still = is_first && frame.environment == frame_before.environment &&
                  hidden_in(frame) == hidden_in(frame_before);
@@ -148,12 +171,14 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(Step step, Round rou
     light->turn = turn_between(light->before, light->now);
   if (is_first) note(frame);
   const bool is_seen = round >= Round(0) && round != kProbeRound;
+  light->presampled = presampled_.find({step, round});
   if (light->presampled == nullptr) {
     light->presampled = presampled_.insert(
         {step, round},
         std::make_shared<const PresampledSets>(presample_sets(
             light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number.value()),
-            presampled_layout(job_), frame.round_of_frame(round), is_seen ? num_sets_ : 1)));
+            presampled_layout(job_), frame.round_of_frame(round), is_seen ? num_sets_ : 1,
+            do_parts)));
   }
   return std::shared_ptr<const FrameLight>(std::move(light));
 }
@@ -167,6 +192,7 @@ std::shared_ptr<const Irradiance> LightSequence::irradiance(const EnvironmentFra
 
 /// What is odd about the maps of a frame that are not known yet, and about the step to it.
 void LightSequence::note(const FrameSpec& frame) {
+  const std::lock_guard lock(notes_mutex_);
   if (!noted_.insert(frame.step).second) return;
   const auto add = [&](const std::vector<std::string>& lines) {
     for (const std::string& line : lines)
@@ -195,7 +221,7 @@ void LightSequence::note(const FrameSpec& frame) {
 }
 
 std::vector<std::string> LightSequence::notes() const {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(notes_mutex_);
   return notes_;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -47,8 +48,8 @@ inline constexpr Round kProbeRound(1 << 30);
 
 /// The environments of a job's frames, prepared on demand. What is made for a frame is kept while
 /// memory allows, of as many frames as tasks in hand may ask for. Any number of threads may ask; a
-/// frame is prepared once while the others wait. A frame's light is a pure function of (job, frame,
-/// round).
+/// frame is prepared once by all who wait for light. A frame's light is a pure function of (job,
+/// frame, round).
 class LightSequence {
  public:
   /// job must outlive the object. maps: may be shared with other jobs. share: of what it makes.
@@ -65,14 +66,18 @@ class LightSequence {
   std::vector<std::string> notes() const;
 
  private:
+  std::shared_ptr<const FrameLight> known(Step step, Round round);
+  Result<std::shared_ptr<const FrameLight>> make(Step step, Round round, const DoParts& do_parts);
   Step first_with_texels_of(const EnvironmentFrame& frame) const;
   std::shared_ptr<const Irradiance> irradiance(const EnvironmentFrame& frame,
                                                const Environment& environment);
-  Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key, const HiddenCone& hidden);
+  Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key, const HiddenCone& hidden,
+                                                        const DoParts& do_parts);
   Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame,
-                                                          const HiddenCone& hidden);
+                                                          const HiddenCone& hidden,
+                                                          const DoParts& do_parts);
   HiddenCone hidden_in(const FrameSpec& frame);
-  Result<Environment> environment(const FrameSpec& frame);
+  Result<Environment> environment(const FrameSpec& frame, const DoParts& do_parts);
   Result<Environment> seen_environment(const Environment& now);
   void note(const FrameSpec& frame);
 
@@ -83,7 +88,11 @@ class LightSequence {
   std::vector<FrameSpec> frames_;
   const std::int32_t num_sets_;  ///< sets of presampled light
   const float capped_share_;     ///< of the tables of maps (EnvironmentMap)
-  mutable std::mutex mutex_;
+  Team team_;                    ///< its turn: the caches, but for their finding
+  std::mutex known_mutex_;
+  /// As long as somebody has it.
+  std::map<std::pair<Step, Round>, std::weak_ptr<const FrameLight>> known_;
+  mutable std::mutex notes_mutex_;
   /// By the first step that shows these texels, and what is hidden of them.
   LruCache<std::pair<Step, HiddenCone>, EnvironmentMap> mixed_maps_;
   LruCache<std::pair<Step, Round>, PresampledSets> presampled_;

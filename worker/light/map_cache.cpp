@@ -8,7 +8,7 @@ namespace baton {
 
 Result<MapCache::MapPtr> MapCache::get(const std::string& path, const EnvironmentSpec& environment,
                                        bool compensate, const HiddenCone& hidden,
-                                       float capped_share) {
+                                       float capped_share, const DoParts& do_parts) {
   const Key key{path,   environment.filter, environment.scale, environment.max_width, compensate,
                 hidden, capped_share};
   const std::lock_guard lock(reading_);
@@ -22,8 +22,8 @@ Result<MapCache::MapPtr> MapCache::get(const std::string& path, const Environmen
   BATON_ASSIGN(const RgbImage image, patiently(read));
   reports_.insert_or_assign({path, environment.scale},
                             report_map(path, image, environment.scale, environment.max_width));
-  return maps_.insert(key, std::make_shared<const EnvironmentMap>(
-                               make_map(image, environment, compensate, hidden, capped_share)));
+  return maps_.insert(key, std::make_shared<const EnvironmentMap>(make_map(
+                               image, environment, compensate, hidden, capped_share, do_parts)));
 }
 
 MapReport MapCache::report(const std::string& path, float scale) const {

@@ -43,7 +43,8 @@ class MapCache {
   /// of EnvironmentMap, ask for. A disk that is away for a moment is waited for. Error: a map that
   /// cannot be read, is too large, or has changed.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
-                     const HiddenCone& hidden = {}, float capped_share = 0);
+                     const HiddenCone& hidden = {}, float capped_share = 0,
+                     const DoParts& do_parts = do_in_turn);
   /// What is known of a map that was got with this scale; nothing of a map that was not.
   MapReport report(const std::string& path, float scale) const;
 

@@ -128,11 +128,13 @@ PresampledLight presample_light(const Environment& now, const Environment& befor
 PresampledSets presample_sets(const Environment& now, const Environment& before,
                               std::uint64_t job_seed, std::uint32_t frame,
                               const PresampledLightLayout& layout, std::int32_t round,
-                              std::int32_t num_sets) {
+                              std::int32_t num_sets, const DoParts& do_parts) {
   PresampledSets result;
-  for (std::int32_t set = 0; set < num_sets; ++set)
-    result.sets.push_back(presample_light(now, before, job_seed, frame, layout, round,
-                                          static_cast<std::uint32_t>(set)));
+  result.sets.resize(static_cast<std::size_t>(num_sets));
+  do_parts(result.sets.size(), [&](std::size_t set) {
+    result.sets[set] = presample_light(now, before, job_seed, frame, layout, round,
+                                       static_cast<std::uint32_t>(set));
+  });
   return result;
 }
 

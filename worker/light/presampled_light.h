@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/base/team.h"
 #include "common/math/octahedral.h"
 #include "common/math/philox.h"
 #include "worker/surface/environment_view.h"
@@ -100,11 +101,12 @@ struct PresampledLightLayout {
   bool with_before = false;
 };
 
-/// The presampled light of one frame and round, in num_sets sets. Arguments as below.
+/// The presampled light of one frame and round, in num_sets sets, of which each is a part.
+/// Arguments as below.
 PresampledSets presample_sets(const Environment& now, const Environment& before,
                               std::uint64_t job_seed, std::uint32_t frame,
                               const PresampledLightLayout& layout, std::int32_t round,
-                              std::int32_t num_sets);
+                              std::int32_t num_sets, const DoParts& do_parts = do_in_turn);
 
 /// One set of the presampled light of one frame. before: the environment of the frame before (the
 /// same as `now` for the first frame). round: each has other directions. set: its number.

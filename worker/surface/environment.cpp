@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <span>
 
 #include "common/base/check.h"
@@ -27,21 +28,31 @@ double mean_rgb(const EnvironmentMap::Texel& t) {
   return (static_cast<double>(t.r) + t.g + t.b) * (1.0 / 3.0);
 }
 
+/// Does f(row) for rows of a table, in bands.
+template <class F>
+void for_each_row(const DoParts& do_parts, std::size_t rows, const F& f) {
+  constexpr std::size_t kBand = 32;
+  do_parts((rows + kBand - 1) / kBand, [&](std::size_t band) {
+    for (std::size_t row = band * kBand; row < std::min(rows, (band + 1) * kBand); ++row) f(row);
+  });
+}
+
 int num_blocks(int width) { return (width + kBlock - 1) / kBlock; }
 
 }  // namespace
 
 EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float scale,
-                               bool compensate, const HiddenCone& hidden, float capped_share)
+                               bool compensate, const HiddenCone& hidden, float capped_share,
+                               const DoParts& do_parts)
     : width_(image.width), height_(image.height), filter_(filter) {
   BATON_CHECK(width_ > 0 && height_ > 0);
   BATON_CHECK(image.rgb.size() == std::size_t{3} * static_cast<std::size_t>(width_) * height_);
   texels_.resize(static_cast<std::size_t>(stride()) * (height_ + 2));
 
   // Copy the rows, zero what is no radiance.
-  const float* source = image.rgb.data();
-  for (int j = 0; j < height_; ++j) {
-    Texel* row = &texels_[static_cast<std::size_t>(j + 1) * stride() + 1];
+  for_each_row(do_parts, static_cast<std::size_t>(height_), [&](std::size_t j) {
+    const float* source = image.rgb.data() + 3 * j * static_cast<std::size_t>(width_);
+    Texel* row = &texels_[(j + 1) * static_cast<std::size_t>(stride()) + 1];
     for (int i = 0; i < width_; ++i, source += 3) {
       const auto [r, g, b] = texel_radiance(source, scale);
       row[i] = {r, g, b, 0};
@@ -50,27 +61,31 @@ EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float sc
     // Wrap around horizontally.
     row[-1] = row[width_ - 1];
     row[width_] = row[0];
-  }
+  });
 
   // Repeat the first and the last row.
   std::copy_n(texels_.begin() + stride(), stride(), texels_.begin());
   std::copy_n(texels_.end() - 2 * stride(), stride(), texels_.end() - stride());
   if (hidden.angle > 0) hide(hidden);
-  build_table(compensate, capped_share);
+  build_table(compensate, capped_share, do_parts);
 }
 
 EnvironmentMap::EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t,
-                               float scale, bool compensate, float capped_share)
+                               float scale, bool compensate, float capped_share,
+                               const DoParts& do_parts)
     : width_(a.width_), height_(a.height_), filter_(a.filter_) {
   BATON_CHECK(a.width_ == b.width_ && a.height_ == b.height_ && a.filter_ == b.filter_);
   texels_.resize(a.texels_.size());
-  for (std::size_t i = 0; i < texels_.size(); ++i) {
-    const Texel& p = a.texels_[i];
-    const Texel& q = b.texels_[i];
-    texels_[i] = {scale * ((1 - t) * p.r + t * q.r), scale * ((1 - t) * p.g + t * q.g),
-                  scale * ((1 - t) * p.b + t * q.b), std::copysign(0.0f, p.density)};
-  }
-  build_table(compensate, capped_share);
+  const auto columns = static_cast<std::size_t>(stride());
+  for_each_row(do_parts, texels_.size() / columns, [&](std::size_t row) {
+    for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) {
+      const Texel& p = a.texels_[i];
+      const Texel& q = b.texels_[i];
+      texels_[i] = {scale * ((1 - t) * p.r + t * q.r), scale * ((1 - t) * p.g + t * q.g),
+                    scale * ((1 - t) * p.b + t * q.b), std::copysign(0.0f, p.density)};
+    }
+  });
+  build_table(compensate, capped_share, do_parts);
 }
 
 int EnvironmentMap::cell_rows() const { return height_ + (filter_ == MapFilter::bilinear ? 1 : 0); }
@@ -126,80 +141,91 @@ double EnvironmentMap::weight_down(const Texel* texel, double place) const {
   return (1 - place) * weight(*texel) + place * weight(texel[stride()]);
 }
 
-double EnvironmentMap::weigh_texels() {
-  for (Texel& texel : texels_)
+double EnvironmentMap::weigh_texels(const DoParts& do_parts) {
+  for_each_texel(do_parts, [](Texel& texel, std::size_t) {
     texel.density = std::copysign(static_cast<float>(mean_rgb(texel)), texel.density);
-  return integral_of_weights();
+  });
+  return integral_of_weights(do_parts);
 }
 
-void EnvironmentMap::reduce_weights(double offset, double factor) {
-  for (Texel& texel : texels_) {
+void EnvironmentMap::reduce_weights(double offset, double factor, const DoParts& do_parts) {
+  for_each_texel(do_parts, [&](Texel& texel, std::size_t) {
     const double weight = std::fabs(double{texel.density}) - offset;
     const float density =
         weight > 0 ? std::max(static_cast<float>(weight * factor), kMinDensity) : 0.0f;
     texel.density = std::copysign(density, texel.density);
-  }
+  });
 }
 
-double EnvironmentMap::integral_of_weights() const {
-  double sum = 0;
-  for (int r = 0; r < cell_rows(); ++r) {
-    const Texel* texel = &texels_[cell_row(r)];
+double EnvironmentMap::integral_of_weights(const DoParts& do_parts) const {
+  std::vector<double> of_rows(static_cast<std::size_t>(cell_rows()));
+  for_each_row(do_parts, of_rows.size(), [&](std::size_t r) {
+    const Texel* texel = &texels_[cell_row(static_cast<int>(r))];
     Edges row;
     for (int i = 0; i < width_; ++i) row += edges_of(texel + i);
-    sum += rows_[static_cast<std::size_t>(r)].integral(row.upper, row.lower);
-  }
-  return sum;
+    of_rows[r] = rows_[r].integral(row.upper, row.lower);
+  });
+  return std::accumulate(of_rows.begin(), of_rows.end(), 0.0);
 }
 
-void EnvironmentMap::cap_weights(float share, double power) {
+void EnvironmentMap::cap_weights(float share, double power, const DoParts& do_parts) {
   std::vector<float> plain(texels_.size());
-  std::transform(texels_.begin(), texels_.end(), plain.begin(),
-                 [](const Texel& texel) { return std::fabs(texel.density); });
   const auto most = static_cast<float>(power / (4 * std::numbers::pi));
-  for (Texel& texel : texels_)
-    texel.density = std::copysign(std::min(std::fabs(texel.density), most), texel.density);
-  const double capped_power = integral_of_weights();
+  for_each_texel(do_parts, [&](Texel& texel, std::size_t i) {
+    plain[i] = std::fabs(texel.density);
+    texel.density = std::copysign(std::min(plain[i], most), texel.density);
+  });
+  const double capped_power = integral_of_weights(do_parts);
   if (!(capped_power > 0)) share = 0;
   const double factor = share > 0 ? share / capped_power * power : 0;
-  for (std::size_t i = 0; i < texels_.size(); ++i) {
-    Texel& texel = texels_[i];
+  for_each_texel(do_parts, [&](Texel& texel, std::size_t i) {
     const double weight = (1 - double{share}) * plain[i] + factor * std::fabs(texel.density);
     texel.density = std::copysign(static_cast<float>(weight), texel.density);
-  }
+  });
 }
 
-void EnvironmentMap::build_table(bool compensate, float capped_share) {
+template <class F>
+void EnvironmentMap::for_each_texel(const DoParts& do_parts, const F& f) {
+  const auto columns = static_cast<std::size_t>(stride());
+  for_each_row(do_parts, texels_.size() / columns, [&](std::size_t row) {
+    for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) f(texels_[i], i);
+  });
+}
+
+void EnvironmentMap::build_table(bool compensate, float capped_share, const DoParts& do_parts) {
   const int rows = cell_rows(), blocks = num_blocks(width_);
   for (int r = 0; r < rows; ++r) rows_.emplace_back(row_angle(r), row_angle(r + 1), width_);
 
   // Turn radiance into densities.
-  double power = total_power_ = weigh_texels();
+  double power = total_power_ = weigh_texels(do_parts);
   if (compensate) {
-    reduce_weights(total_power_ / (4 * std::numbers::pi), 1);
-    power = integral_of_weights();
-    if (power < kMinCompensatedShare * total_power_) power = weigh_texels();
+    reduce_weights(total_power_ / (4 * std::numbers::pi), 1, do_parts);
+    power = integral_of_weights(do_parts);
+    if (power < kMinCompensatedShare * total_power_) power = weigh_texels(do_parts);
   }
   if (capped_share > 0 && power > 0) {
-    cap_weights(capped_share, power);
-    power = integral_of_weights();
+    cap_weights(capped_share, power, do_parts);
+    power = integral_of_weights(do_parts);
   }
-  reduce_weights(0, power > 0 ? 1 / power : 0);
+  reduce_weights(0, power > 0 ? 1 / power : 0, do_parts);
 
   // Sum them up.
-  row_cdf_.assign(1, 0.0);
-  block_cdf_.reserve(static_cast<std::size_t>(rows) * static_cast<std::size_t>(blocks + 1));
-  for (int r = 0; r < rows; ++r) {
-    const Texel* texel = &texels_[cell_row(r)];
-    Edges sum;
-    block_cdf_.push_back(sum);
+  const auto row_size = static_cast<std::size_t>(blocks + 1);
+  block_cdf_.resize(static_cast<std::size_t>(rows) * row_size);
+  for_each_row(do_parts, static_cast<std::size_t>(rows), [&](std::size_t r) {
+    const Texel* texel = &texels_[cell_row(static_cast<int>(r))];
+    Edges* const sums = &block_cdf_[r * row_size];
     for (int block = 0; block < blocks; ++block) {
+      Edges sum = sums[block];
       const int end = std::min((block + 1) * kBlock, width_);
       for (int i = block * kBlock; i < end; ++i) sum += edges_of(texel + i);
-      block_cdf_.push_back(sum);
+      sums[block + 1] = sum;
     }
-    row_cdf_.push_back(row_cdf_.back() +
-                       rows_[static_cast<std::size_t>(r)].integral(sum.upper, sum.lower));
+  });
+  row_cdf_.assign(1, 0.0);
+  for (std::size_t r = 0; r < static_cast<std::size_t>(rows); ++r) {
+    const Edges& sum = block_cdf_[(r + 1) * row_size - 1];
+    row_cdf_.push_back(row_cdf_.back() + rows_[r].integral(sum.upper, sum.lower));
   }
 }
 
@@ -292,16 +318,19 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
 }
 
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
-                        bool compensate, const HiddenCone& hidden, float capped_share) {
+                        bool compensate, const HiddenCone& hidden, float capped_share,
+                        const DoParts& do_parts) {
   const int width = map_sides(picture.width, picture.height, environment.max_width)[0];
   if (width == picture.width)
-    return {picture, environment.filter, environment.scale, compensate, hidden, capped_share};
+    return {picture, environment.filter, environment.scale, compensate,
+            hidden,  capped_share,       do_parts};
   return {reduce_map(picture, width, environment.scale),
           environment.filter,
           1,
           compensate,
           hidden,
-          capped_share};
+          capped_share,
+          do_parts};
 }
 
 }  // namespace baton

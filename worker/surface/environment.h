@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/team.h"
 #include "common/image/image_io.h"
 #include "common/job/plan/sequence.h"
 #include "worker/surface/map_row.h"
@@ -52,12 +53,14 @@ class EnvironmentMap {
 
   /// image: at least 1x1. scale: radiance factor. compensate: the table of MIS compensation, max(0,
   /// L - mean L) [Karlik et al. 2019] (a constant map keeps its plain table). capped_share: of the
-  /// density, by capped radiance; [0, 1), not with `compensate`.
+  /// density, by capped radiance; [0, 1), not with `compensate`. do_parts: bands of rows, which do
+  /// not show.
   EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate,
-                 const HiddenCone& hidden = {}, float capped_share = 0);
+                 const HiddenCone& hidden = {}, float capped_share = 0,
+                 const DoParts& do_parts = do_in_turn);
   /// Texels scale ((1 - t) a + t b); a and b of one size and filter, with one cone. t in [0, 1].
   EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, float scale,
-                 bool compensate, float capped_share = 0);
+                 bool compensate, float capped_share = 0, const DoParts& do_parts = do_in_turn);
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -95,22 +98,25 @@ class EnvironmentMap {
   double row_angle(int row) const;
   /// Index in texels_ of the texel that owns the first cell of a row.
   std::size_t cell_row(int row) const;
+  /// f(texel, its place in texels_), for all of them.
+  template <class F>
+  void for_each_texel(const DoParts& do_parts, const F& f);
   /// Marks the cells that lie wholly in the cone.
   void hide(const HiddenCone& cone);
   /// Weights as means over RGB; the power of the map.
-  double weigh_texels();
+  double weigh_texels(const DoParts& do_parts);
   /// Weights less an offset, where positive, times a factor.
-  void reduce_weights(double offset, double factor);
+  void reduce_weights(double offset, double factor, const DoParts& do_parts);
   /// Edges of the cell that a texel owns; zero where it is hidden.
   Edges edges_of(const Texel* texel) const;
   /// Weight at a place down in the cell that a texel owns, on its left side (nearest: of all of
   /// it).
   double weight_down(const Texel* texel, double place) const;
   /// Integral of the weights over the visible cells.
-  double integral_of_weights() const;
+  double integral_of_weights(const DoParts& do_parts) const;
   /// Mixes that share of capped weights in. power: integral of the weights, > 0.
-  void cap_weights(float share, double power);
-  void build_table(bool compensate, float capped_share);
+  void cap_weights(float share, double power, const DoParts& do_parts);
+  void build_table(bool compensate, float capped_share, const DoParts& do_parts);
 
   int width_ = 0, height_ = 0;
   MapFilter filter_ = MapFilter::bilinear;
@@ -128,7 +134,8 @@ class EnvironmentMap {
 /// The map of a file's picture as the environment says: scaled, repaired, and reduced to
 /// max_width columns where it has more.
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
-                        bool compensate, const HiddenCone& hidden = {}, float capped_share = 0);
+                        bool compensate, const HiddenCone& hidden = {}, float capped_share = 0,
+                        const DoParts& do_parts = do_in_turn);
 
 /// A map turned by a rotation: what one frame is lit by.
 struct Environment {

@@ -122,7 +122,12 @@ Result<std::optional<ShownJob>> RenderSession::follow(const JobSpec& spec, const
     const bool is_stuck = shown && (shown->detail.lacks_room || shown->lacks_renderer);
     const bool over = !shown || shown->detail.summary.status != JobStatus::running ||
                       (is_stuck && farm_.is_own());
-    if (over || interrupted() || signals_.stop_requested_within(kFarmPollInterval)) {
+    // Once all is rendered it is done in a moment.
+    constexpr std::chrono::milliseconds kMoment{20};
+    const bool is_rendered =
+        shown && shown->detail.summary.tasks_done == shown->detail.summary.tasks_total;
+    if (over || interrupted() ||
+        signals_.stop_requested_within(is_rendered ? kMoment : kFarmPollInterval)) {
       progress.finish();
       return over ? shown : std::nullopt;
     }

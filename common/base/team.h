@@ -1,0 +1,53 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <functional>
+#include <mutex>
+#include <string>
+
+namespace baton {
+
+/// Does part(0) ... part(parts - 1), each once, on any thread and in any order; returns when all
+/// are done. What they make must not depend on either.
+using DoParts =
+    std::function<void(std::size_t parts, const std::function<void(std::size_t)>& part)>;
+
+/// One after the other.
+inline void do_in_turn(std::size_t parts, const std::function<void(std::size_t)>& part) {
+  for (std::size_t i = 0; i < parts; ++i) part(i);
+}
+
+/// A mutex whose waiters help: what one thread makes while others wait for it is made in parts by
+/// all of them. Traces have the parts under the name of the whole.
+class Team {
+ public:
+  /// The right to make something; others wait for its end, and help.
+  class Turn {
+   public:
+    /// Waits until nobody has the turn. what: in traces.
+    Turn(Team& team, std::string what);
+    ~Turn();
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+    /// Does parts, with whoever waits for the turn.
+    void share(std::size_t parts, const std::function<void(std::size_t)>& part);
+
+   private:
+    Team& team_;
+  };
+
+ private:
+  /// Does parts as long as there are some that nobody has begun; locked before and after.
+  void help(std::unique_lock<std::mutex>& lock);
+
+  std::mutex mutex_;
+  std::condition_variable changed_;  ///< there are parts, all are done, or the turn is over
+  bool is_taken_ = false;
+  std::string what_;                                        ///< that is made
+  const std::function<void(std::size_t)>* part_ = nullptr;  ///< of what is shared; null: nothing is
+  std::size_t count_ = 0, next_ = 0, done_ = 0;
+};
+
+}  // namespace baton
