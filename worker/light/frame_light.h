@@ -88,7 +88,8 @@ class LightSequence {
   std::vector<FrameSpec> frames_;
   const std::int32_t num_sets_;  ///< sets of presampled light
   const float capped_share_;     ///< of the tables of maps (EnvironmentMap)
-  Team team_;                    ///< its turn: the caches, but for their finding
+  /// Whose turn it is makes light.
+  Team team_;
   std::mutex known_mutex_;
   /// As long as somebody has it.
   std::map<std::pair<Step, Round>, std::weak_ptr<const FrameLight>> known_;
