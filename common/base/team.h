@@ -43,10 +43,10 @@ class Team {
   void help(std::unique_lock<std::mutex>& lock);
 
   std::mutex mutex_;
-  std::condition_variable changed_;  ///< there are parts, all are done, or the turn is over
+  std::condition_variable changed_;  ///< parts, or the turn
   bool is_taken_ = false;
   std::string what_;                                        ///< that is made
-  const std::function<void(std::size_t)>* part_ = nullptr;  ///< of what is shared; null: nothing is
+  const std::function<void(std::size_t)>* part_ = nullptr;  ///< null: nothing is shared
   std::size_t count_ = 0, next_ = 0, done_ = 0;
 };
 
