@@ -181,7 +181,10 @@ OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, co
       const FileVerdict verdict = judge_locked(path);
       if (verdict.state == FileState::absent)
         odd.doubt.locked_absent.push_back({path.string(), number});
-      if (verdict.state == FileState::unreadable) odd.unreadable = verdict.fault;
+      if (verdict.state == FileState::unreadable) {
+        odd.unreadable = verdict.fault;
+        odd.is_locked_unreadable = true;
+      }
       continue;
     }
     const std::vector<BlobRef> images = record.images_of(path);

@@ -109,6 +109,7 @@ struct OddFrames {
   FramesInDoubt doubt;
   /// Why one of them cannot be read; empty: none is.
   std::string unreadable;
+  bool is_locked_unreadable = false;  ///< one that is locked is not
 };
 /// For people: what is wrong with them; empty: nothing.
 std::string fault_text(const OddFrames& odd, const JobId& job, const JobSpec* known = nullptr);

@@ -146,7 +146,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   const bool runs = known != nullptr && known->status == JobStatus::running;
   const SharedDocument newest = submission.newest_document(id);
   const std::string fault = fault_text(*odd, id, newest ? &newest->parsed->job : nullptr);
-  const bool may_replace = message.restart && odd->doubt.locked_absent.empty();
+  const bool may_replace =
+      message.restart && odd->doubt.locked_absent.empty() && !odd->is_locked_unreadable;
   if (!odd->unreadable.empty() && !may_replace && !runs && may_pass(document->digest))
     return farm_.refuse(peer, {ErrorKind::timeout, "waits for " + odd->unreadable});
   pass(document->digest);

@@ -66,6 +66,8 @@ class Submission {
   };
   Result<WrittenSweeps> written_sweeps(const ParsedJobDocument& document);
   Result<bool> grow(const Digest& version);
+  std::set<FrameIndex> frames_of_others(const ParsedJobDocument& document,
+                                        const std::vector<InFolder>& jobs) const;
   static std::string newest_renderer(const std::vector<InFolder>& jobs,
                                      const ParsedJobDocument& document);
   Status expect_by_one(const ParsedJobDocument& document, const LockedFrames& locked);

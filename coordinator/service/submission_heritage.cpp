@@ -8,6 +8,7 @@
 
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
+#include "coordinator/service/neighbour.h"
 #include "coordinator/service/plan_text.h"
 #include "coordinator/service/submission.h"
 
@@ -73,6 +74,23 @@ Status Submission::expect_by_one(const ParsedJobDocument& document, const Locked
                   newest)};
 }
 
+/// Frames in whose places other pictures of jobs that are known here stand.
+std::set<FrameIndex> Submission::frames_of_others(const ParsedJobDocument& document,
+                                                  const std::vector<InFolder>& jobs) const {
+  std::set<FrameIndex> frames;
+  const FramesByFile by_file(document);
+  for (const auto& [digest, former] : jobs) {
+    if (former.document.picture == document.picture) continue;
+    for (const Completions::Task& task : former.tasks) {
+      if (task.task.kind != TaskKind::assemble || task.outputs.size() != 1) continue;
+      const auto place = by_file.find(former.document.job, task.task.frame());
+      if (place && files_.is_right(frame_path(document.job, *place), task.outputs.front()))
+        frames.insert(*place);
+    }
+  }
+  return frames;
+}
+
 /// What jobs of the same picture in the same folder leave to a new one, itself among them.
 /// restart: nothing, where nobody who is connected renders as that was rendered.
 Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& document,
@@ -96,6 +114,7 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
     formers.push_back(std::move(former));
     heritage.formers.push_back(digest);
   }
+  const std::set<FrameIndex> of_others = frames_of_others(document, *neighbours);
   folders_.clear();
   heritage.adoption = adopt(document, formers, kept_files(document.job, locked));
   const Adoption& adoption = heritage.adoption;
@@ -108,7 +127,8 @@ Result<Submission::Heritage> Submission::find_heritage(const ParsedJobDocument& 
   constexpr std::size_t kMost = 8;
   std::size_t num_gone = 0;
   for (const FrameIndex frame : adoption.lost) {
-    if (adoption.overwritten.contains(frame) || ++num_gone > kMost) continue;
+    if (adoption.overwritten.contains(frame) || of_others.contains(frame)) continue;
+    if (++num_gone > kMost) continue;
     reasons.push_back(fmt::format("{} is gone, or not as it was last written",
                                   frame_path(document.job, frame).string()));
   }
