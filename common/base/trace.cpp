@@ -86,7 +86,8 @@ class TraceFile {
     waiting_ += ",\n";
   }
   Status begin() {
-    file_ = FileDescriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
+    file_ = FileDescriptor(::open(
+        path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK, 0600));
     struct stat status {};
     if (!file_ || ::fstat(file_.number(), &status) != 0)
       return Error{ErrorKind::io, fmt::format("{}: {}", path_.string(), std::strerror(errno))};

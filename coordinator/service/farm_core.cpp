@@ -357,7 +357,11 @@ Result<std::string> FarmCore::mark_output(const Digest& job) {
   if (marked_.contains(job) && (lost_mark(job, open->spec) || (there && *there == frames)))
     return token;
   if (!check_output_root(open->spec, options.roots)) return std::string();
-  if (!write_token(file, token, frames, options.roots)) return std::string();
+  if (const Status written = write_token(file, token, frames, options.roots); !written) {
+    spdlog::warn("job {}: its output folder is not marked: {}", history.name_of(job),
+                 written.error().message);
+    return std::string();
+  }
   marked_.insert(job);
   BATON_TRY(journal.record_output_mark(job, resolve_folder(open->spec.output.directory)));
   return token;

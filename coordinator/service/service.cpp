@@ -364,6 +364,10 @@ Status Service::receive_from(const std::string& worker, const LeaseReturn& messa
     tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,
                      farm_.history.name_of(message.lease.job), unseen));
   if (!unseen.empty()) {
+    // What the folder is known by may not have been written: there was no room, or something stood
+    // in its place.
+    const Result<std::string> marked = farm_.mark_output(message.lease.job);
+    if (!marked) return marked.error();
     BATON_ASSIGN(const bool is_elsewhere, watch_folder(message.lease.job));
     if (is_elsewhere) return farm_.step(LeaseReturned{worker, message.lease});
   }

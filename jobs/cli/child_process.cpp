@@ -63,8 +63,9 @@ std::string MemoryFile::last_line() const {
 
 Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command,
                                          const fs::path& log) {
-  const FileDescriptor file(
-      ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_CLOEXEC, 0600));
+  // A named pipe must not make us wait.
+  const FileDescriptor file(::open(
+      log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK, 0600));
   if (!file)
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot open: {}", log.string(), std::strerror(errno))};

@@ -154,7 +154,8 @@ TEST_F(SchedulerTest, AnotherResultThanBeforeKeepsAJobFromItsEnd) {
   EXPECT_EQ(num_conflicts, 1u);
   EXPECT_EQ(again.progress().tasks_open, 0u);
   EXPECT_EQ(again.status(), JobStatus::paused);
-  EXPECT_THAT(waits_for(again.scheduler, again.job, again.now), testing::HasSubstr("different"));
+  EXPECT_THAT(waits_for(again.scheduler, again.job, again.now),
+              testing::HasSubstr("worker b has made other bytes of frame 4 than were there"));
   again.step(JobResumed{again.job});
   EXPECT_EQ(again.status(), JobStatus::done);
 }

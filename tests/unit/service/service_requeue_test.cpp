@@ -295,6 +295,27 @@ TEST_F(RequeueTest, WhateverStandsInThePlaceOfALockFileEndsNoCoordinator) {
   }
 }
 
+TEST_F(RequeueTest, AMarkThatCouldNotBeWrittenIsWrittenOnceAWorkerMissesIt) {
+  Busy farm(*this);
+  const std::string& endpoint = farm.endpoint;
+  do_one_task(farm.worker);
+  fs::path mark;
+  for (const auto& entry : fs::directory_iterator(job.output.directory)) {
+    if (entry.path().filename().string().starts_with(".baton-")) mark = entry.path();
+  }
+  ASSERT_TRUE(fs::is_regular_file(mark));
+  ask<ShownJob>(endpoint, CancelJob{"test"});
+  ASSERT_FALSE(fs::exists(mark));
+  fs::create_directory(mark);
+  submit(endpoint);
+  fs::remove(mark);
+  farm.worker.say(LeaseRequest{1});
+  farm.worker.say(LeaseReturn{farm.worker.expect<LeaseGrant>().lease, "/frames: no mark"});
+  farm.worker.say(Heartbeat{});
+  farm.worker.expect<Heartbeat>();
+  EXPECT_TRUE(fs::is_regular_file(mark));
+}
+
 TEST_F(RequeueTest, TimesAreThoseOfTheLastRendering) {
   Busy farm(*this);
   const std::string& endpoint = farm.endpoint;
