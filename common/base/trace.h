@@ -14,7 +14,7 @@ namespace baton {
 
 /// What the threads of a process did, and for what they waited: spans of time in a file, in the
 /// Trace Event Format that Chrome has introduced (Perfetto and speedscope read it, too). Off until
-/// trace_to_file(); then a span takes about a microsecond.
+/// trace_to_file(); then a span takes some microseconds.
 
 /// What a span is. Written by name (span_kind_name); readers skip kinds that they do not know.
 enum class SpanKind : std::uint8_t {

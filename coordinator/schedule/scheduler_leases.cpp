@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/base/limits.h"
+#include "common/job/plan/task_place.h"
 #include "coordinator/schedule/held_states.h"
 #include "coordinator/schedule/scheduler.h"
 
@@ -275,6 +276,35 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
     }
     if (!wanted.empty()) return;
   }
+}
+
+/// Two different results for one task are a bug or a broken machine: the job pauses, so that
+/// somebody looks before more is made of them. Of a placeholder no bytes are known, and renderers
+/// that take over from each other differ. Returns whether they are equal.
+bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
+                                const std::vector<BlobRef>& reported, Actions& actions) {
+  const auto [e, r] = std::mismatch(expected.begin(), expected.end(), reported.begin(),
+                                    reported.end(), [](const BlobRef& a, const BlobRef& b) {
+                                      return a.is_placeholder() || b.is_placeholder() || a == b;
+                                    });
+  const Digest digest = event.lease.job;
+  Job& job = jobs_.at(digest);
+  const bool may_differ = rules_.may_take_over || job.is_mixed;
+  if (may_differ || e == expected.end() || r == reported.end()) return true;
+  const std::string& maker = job.tasks.made().maker(*job.tasks.graph().find(event.lease.task));
+  actions.push_back(ReportConflict{event.lease, event.worker, maker, *e, *r});
+  if (job.status != JobStatus::running) return false;
+  const std::string place = place_text(place_of(job, event.lease.task));
+  job.waits =
+      maker == job.tasks.made().stranger()
+          ? fmt::format(
+                "somebody to look: worker {} has made other bytes of {} than were there "
+                "before (`baton farm events` says who had made them)",
+                event.worker, place)
+          : fmt::format("somebody to look: workers {} and {} have made different bytes of {}",
+                        maker, event.worker, place);
+  pause_job(digest, job, job.waits, actions);
+  return false;
 }
 
 /// Whether the worker, which renders otherwise than the job was begun, makes the frames that are

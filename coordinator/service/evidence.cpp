@@ -1,12 +1,15 @@
 #include "coordinator/service/evidence.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <cerrno>
 
 #include "common/base/file_descriptor.h"
 #include "common/base/file_stamp.h"
+#include "common/base/limits.h"
 #include "common/job/plan/sequence.h"
 
 namespace baton {
@@ -126,6 +129,19 @@ std::optional<std::vector<BlobRef>> find_bad_inputs(const FarmCore& farm, FileTa
   }
   if (bad.empty()) return std::nullopt;
   return bad;
+}
+
+Status wait_for_disk(FarmCore& farm, const std::string& worker, const LeaseId& lease,
+                     const Hindrance& hindrance, const std::string& why) {
+  const std::string told = why.substr(0, limits::kMaxTextLength);
+  const std::string waits = hindrance.lacks.ends_with(told)
+                                ? hindrance.lacks
+                                : fmt::format("{}: {}", hindrance.lacks, told);
+  const Scheduler::Job* const job = farm.scheduler.find_job(lease.job);
+  const bool pauses = job != nullptr && hindrance.stays && job->waits.starts_with(hindrance.lacks);
+  if (!pauses) spdlog::warn("job {} waits for {}", farm.history.name_of(lease.job), waits);
+  BATON_TRY(farm.step(SpaceLacking{worker, lease, waits}));
+  return pauses ? farm.step(JobPaused{lease.job, waits}) : Status();
 }
 
 std::vector<FileToRead> unread_inputs(const FarmCore& farm, const FileTable& files,

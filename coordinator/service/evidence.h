@@ -35,6 +35,10 @@ struct Hindrance {
 };
 /// nullopt: nothing that can be seen from here.
 std::optional<Hindrance> find_hindrance(const FarmCore& farm, const LeaseId& lease);
+/// The task waits for what it lacks: nobody's failure. What stays pauses its job the second time:
+/// the first may be an error of the moment. why: what the worker said.
+Status wait_for_disk(FarmCore& farm, const std::string& worker, const LeaseId& lease,
+                     const Hindrance& hindrance, const std::string& why);
 /// The inputs of a leased task that must be read to tell whether they are damaged.
 std::vector<FileToRead> unread_inputs(const FarmCore& farm, const FileTable& files,
                                       const LeaseId& lease);

@@ -46,21 +46,6 @@ Status check_leases(const std::vector<LeaseId>& running) {
 /// As Scheduler::Job::renderer has it.
 std::string renderer_of(const WorkerHello& hello) { return hello.renderer + ", " + hello.build; }
 
-/// why: what the worker said.
-Status wait_for_disk(FarmCore& farm, const std::string& worker, const LeaseId& lease,
-                     const Hindrance& hindrance, const std::string& why) {
-  const std::string told = why.substr(0, limits::kMaxTextLength);
-  const std::string waits = hindrance.lacks.ends_with(told)
-                                ? hindrance.lacks
-                                : fmt::format("{}: {}", hindrance.lacks, told);
-  // The first time it may be an error of the moment.
-  const Scheduler::Job* const job = farm.scheduler.find_job(lease.job);
-  const bool pauses = job != nullptr && hindrance.stays && job->waits.starts_with(hindrance.lacks);
-  if (!pauses) spdlog::warn("job {} waits for {}", farm.history.name_of(lease.job), waits);
-  BATON_TRY(farm.step(SpaceLacking{worker, lease, waits}));
-  return pauses ? farm.step(JobPaused{lease.job, waits}) : Status();
-}
-
 /// What a worker has to say of a job's files, for those who ask for the job.
 void keep_notes(FarmCore& farm, const TaskDone& report) {
   constexpr std::size_t kMostNotes = 100;

@@ -13,9 +13,8 @@ namespace {
 
 constexpr std::int32_t kFilm = 1;  ///< BlobKind::film, as it is sent
 
-bool is_work(SpanKind kind) {
-  return kind == SpanKind::make || kind == SpanKind::wait || kind == SpanKind::help;
-}
+/// Parts lie in what is made, or in a wait.
+bool is_work(SpanKind kind) { return kind == SpanKind::make || kind == SpanKind::wait; }
 
 /// Busy time of a span: where threads share a processor, that of the clock says too much.
 double cpu_of(const TracedSpan& span) {
@@ -106,10 +105,9 @@ class Dissection {
         of.first_s = std::min(of.first_s, span->start_s);
         of.steps.insert(is_in_frame ? stretch.step : -1);
         if (span->kind == SpanKind::make) {
-          of.made_s += io_free(*span, inside);
+          of.made_s += busy_of(*span, inside);
           ++of.times;
         }
-        if (span->kind == SpanKind::help) of.help_s += cpu_of(*span);
         (is_in_frame ? stretch : found.stretches.front()).busy_s -= cpu_of(*span);
         work_end_s = span->end_s();
         work = span->name;
@@ -128,7 +126,7 @@ class Dissection {
     if (!task.task.is_lost && !task.task.kind.empty()) found_.push_back(std::move(found));
   }
   /// Busy time of a work, reading and writing in it included.
-  static double io_free(const TracedSpan& work, const std::vector<const TracedSpan*>& inside) {
+  static double busy_of(const TracedSpan& work, const std::vector<const TracedSpan*>& inside) {
     double busy_s = cpu_of(work), until_s = 0;
     for (const TracedSpan* span : inside) {
       if (span->start_s < work.start_s || span->end_s() > work.end_s()) continue;
@@ -341,7 +339,8 @@ class Player {
     Work& work = works_[number];
     work.is_made = true;
     for (const std::size_t at : std::exchange(work.tasks, {})) {
-      tasks_[at].waits_s[kind_of(trace_.works[number].name)] += now_s_ - tasks_[at].work_since_s;
+      tasks_[at].waits_s[without_number(trace_.works[number].name)] +=
+          now_s_ - tasks_[at].work_since_s;
       ++tasks_[at].work;
       go_on(at);
     }
@@ -359,13 +358,6 @@ class Player {
       tasks_[follower].cause = number;
       ready_.push(follower);
     }
-  }
-  /// Without numbers: "light of frame 7, round 2" is "light of frame".
-  static std::string kind_of(const std::string& work) {
-    const std::size_t end = work.find_first_of("0123456789");
-    std::string kind = work.substr(0, end);
-    while (kind.ends_with(' ')) kind.pop_back();
-    return kind;
   }
   Playback result() const {
     Playback playback;

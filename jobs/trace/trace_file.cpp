@@ -215,6 +215,12 @@ void keep_job(Trace& trace, std::string_view id) {
   trace.spans = std::move(kept);
 }
 
+std::string without_number(const std::string& name) {
+  std::string kind = name.substr(0, name.find_first_of("0123456789"));
+  while (kind.ends_with(' ')) kind.pop_back();
+  return kind.empty() ? name : kind;
+}
+
 Status write_trace(const fs::path& file, const Trace& trace) {
   std::string text = "[\n";
   const auto add = [&](const std::string& line) { text += line + ",\n"; };

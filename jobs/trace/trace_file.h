@@ -73,6 +73,9 @@ void keep_since(Trace& trace, double seconds);
 /// did for others is "a task of another job".
 void keep_job(Trace& trace, std::string_view id);
 
+/// A span's name without what counts it: "light of frame 7, round 2" is "light of frame".
+std::string without_number(const std::string& name);
+
 /// Writes a trace as Chrome's Trace Event Format has it, an event a line, times from its start on.
 /// Error: io.
 Status write_trace(const std::filesystem::path& file, const Trace& trace);

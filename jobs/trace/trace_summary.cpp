@@ -19,13 +19,6 @@ std::vector<std::pair<std::string, double>> ordered(const Sums& sums) {
   return result;
 }
 
-/// "light of frame 7, round 2" as "light of frame".
-std::string without_number(const std::string& name) {
-  std::string kind = name.substr(0, name.find_first_of("0123456789"));
-  while (kind.ends_with(' ')) kind.pop_back();
-  return kind.empty() ? name : kind;
-}
-
 /// Adds the stretch to the slices that it covers.
 void add_stretch(std::vector<double>& slices, double slice_s, double from_s, double to_s,
                  double sign) {

@@ -185,19 +185,20 @@ def reopened(log):
 
 
 def superseded(log):
-    """times_in() of what says that another version of a job, or another life of the same, takes the place of one."""
-    return times_in(log, "frames of another job take the place of its own")
+    """times_in() of what says that another version of a job, another life of the same, or another job takes the place of
+    one."""
+    return times_in(log, r"(?:version \d+ goes on in place of version \d+|\S+ \w+ writes its frames from now on|it begins again)")
 
 
 def times_in(log, words):
     """(job, time) of each line of the coordinator's log that says this of a job: the beginning of its ID, and the record's
-    milliseconds."""
-    offset_s, now, times = time.time() - time.monotonic(), datetime.datetime.now(), []
-    for hours, minutes, seconds, job in re.findall(r"^(\d\d):(\d\d):([\d.]+) .* job (\w+): " + words, log, re.MULTILINE):
-        at = now.replace(hour=int(hours), minute=int(minutes), second=0, microsecond=0).timestamp() + float(seconds)
-        if at > now.timestamp() + 1:
-            at -= 24 * 3600
-        times.append((job, 1000 * (at - offset_s)))
+    milliseconds. Fault: a line without a time as the log has them."""
+    offset_s, times = time.time() - time.monotonic(), []
+    for line in re.findall(rf"^.*\bjob \w+: {words}.*$", log, re.MULTILINE):
+        dated = re.match(r"(\S+) baton-coordinator \w+: job (\w+): ", line)
+        check(dated is not None, f"not as the log's lines are: {line}")
+        at = datetime.datetime.fromisoformat(dated[1])
+        times.append((dated[2], 1000 * (at.timestamp() - offset_s)))
     return times
 
 

@@ -3,12 +3,14 @@
 
 import os
 import subprocess
+import time
 from pathlib import Path
 
 import chaos_witness as witness
 from chaos import run
 from chaos_disk import PowerCut, enter_namespace
-from farm import Fault, check, check_equal, run_tests
+from chaos_jobs import Job
+from farm import Farm, Fault, check, check_equal, run_tests
 from jobs import make_job, write_job
 
 NUM_FAULTS, SEED = 25, 1
@@ -52,8 +54,17 @@ def a_lease_that_is_taken_is_seen(_programs, _folder):
         check(is_told(taken, **{what: not_excused}), f"{what} {not_excused} have not taken it")
     unknown = [seen(1000, "LeaseGrant", version="cc"), seen(2600, "LeaseRevoke", version="cc")]
     check(not is_told(unknown, ends=[("45", 2000)]), "a version whose submission was not answered may be of any job")
-    log = "12:00:01.500 [info] job 0123abcd: frames of another job take the place of its own\n12:00:02 [info] job 45: paused\n"
-    check_equal([job for job, _ in witness.superseded(log)], ["0123abcd"], "versions that have ended")
+
+
+def what_ends_a_version_is_in_the_log(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        job = Job("rest", 1, farm.folder)
+        since_ms = 1000 * time.monotonic()
+        ident = farm.submit(job.path)
+        farm.submit(job.edit(image={"tileSize": 32}))
+        ended = witness.superseded(farm.coordinator.log())
+        check_equal([ident.startswith(name) for name, _ in ended], [True], "versions that have ended")
+        check(since_ms - witness.LOG_MS <= ended[0][1] <= 1000 * time.monotonic() + witness.LOG_MS, f"when: {ended}")
 
 
 def every_frame_is_right_after_random_faults(programs, folder):

@@ -90,6 +90,12 @@ Result<ExitCode> show_log(const LogOptions& options) {
 
 }  // namespace
 
+void add_logs_option(CLI::App& command, std::string& folder) {
+  command.add_option(
+      "--logs", folder,
+      "the workers' logs, where the coordinator's work folder has another path here");
+}
+
 void add_job_log(CLI::App& job, ExitCode& code) {
   auto options = std::make_shared<LogOptions>();
   CLI::App* log = job.add_subcommand(
@@ -99,8 +105,7 @@ void add_job_log(CLI::App& job, ExitCode& code) {
   log->add_option("--last", options->count, "at most so many lines, the newest")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  log->add_option("--logs", options->folder,
-                  "the workers' logs, where the coordinator's work folder has another path here");
+  add_logs_option(*log, options->folder);
   add_coordinator_options(*log, options->link);
   log->add_flag("--json", options->json, "an object a line, for machines");
   log->footer(

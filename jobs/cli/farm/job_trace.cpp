@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 
 #include "common/base/limits.h"
 #include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/farm/job_log.h"
 #include "jobs/cli/json_text.h"
 #include "jobs/cli/say.h"
 #include "jobs/trace/trace_file.h"
@@ -39,6 +42,16 @@ Result<ExitCode> write_job_trace(const TraceOptions& options) {
                              "--logs FOLDER says where the coordinator has them",
                              folder, job.identity.id.short_hex())};
   }
+  const std::uint64_t num_done = job.detail.summary.tasks_done;
+  const auto num_here =
+      static_cast<std::uint64_t>(std::ranges::count_if(trace.spans, [](const TracedSpan& span) {
+        return span.kind == SpanKind::task && !span.task.kind.empty();
+      }));
+  if (num_here < num_done)
+    tell(
+        "{} of {} tasks are in the traces: workers keep the last, and those of earlier builds had "
+        "none\n",
+        num_here, num_done);
   const std::string file =
       options.out.empty() ? job.identity.id.short_hex() + ".trace.json" : options.out;
   BATON_TRY(write_trace(file, trace));
@@ -60,9 +73,7 @@ void add_job_trace(CLI::App& job, ExitCode& code) {
       "trace", "What each thread of each worker did for a job, as a file for Perfetto");
   command->add_option("ID", options->job, kJobHelp)->required();
   command->add_option("--out", options->out, "the file; default: ID.trace.json");
-  command->add_option(
-      "--logs", options->folder,
-      "the workers' logs, where the coordinator's work folder has another path here");
+  add_logs_option(*command, options->folder);
   add_coordinator_options(*command, options->link);
   command->add_flag("--json", options->json, "what it says, for machines");
   command->footer(

@@ -239,6 +239,9 @@ TEST_F(SessionTest, DrainsWhatRunsThenSaysGoodbye) {
   EXPECT_NE(find<DropQueuedTasks>(draining), nullptr);
   EXPECT_EQ(find<Leave>(draining), nullptr);
   EXPECT_EQ(find<StartTask>(grant(lease(1))), nullptr);
+  const auto told = sent<Heartbeat>(step(Tick{}));
+  ASSERT_EQ(told.size(), 1u) << "at once, not at its turn";
+  EXPECT_TRUE(told[0].is_draining);
 
   const auto ended = finish(lease(0));
   EXPECT_EQ(sent<TaskDone>(ended).size(), 1u);

@@ -55,6 +55,21 @@ TEST_F(FramesTest, ALockedFrameStaysWhateverComes) {
                    SubmitJob{make_job_document(other).value(), /*restart=*/true});
 }
 
+// Nothing replaces a locked frame, so nothing is gained by --restart where it cannot be read.
+TEST_F(FramesTest, ALockedFrameThatCannotBeReadIsInTheWayOfRestartsToo) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  ask<ShownJob>(service.endpoint(), LockFrames{id.hex(), {FrameNumber(2)}});
+  fs::remove(frame(2));
+  fs::create_directory(frame(2));
+  for (const bool restart : {false, true}) {
+    const Error refusal = refused(service.endpoint(), SubmitJob{document, restart});
+    EXPECT_THAT(refusal.message, HasSubstr(frame(2).string())) << restart;
+  }
+}
+
 TEST_F(FramesTest, AFrameThatIsStillToBeRenderedCanBeLocked) {
   const RunningService service(options);
   FakeWorker worker(service.endpoint(), store(), job);
