@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <string_view>
+
 #include "common/base/files.h"
 #include "common/base/limits.h"
 
@@ -13,6 +16,7 @@ namespace {
 
 /// All workers of a farm are of one account.
 constexpr mode_t kOwnersOnly = 0600;
+constexpr std::string_view kJobs = "jobs";  ///< the folder of documents
 
 /// The files below a folder, of this extension, that nobody has written to for kLeftoverAge. What
 /// cannot be read is left out.
@@ -113,14 +117,20 @@ std::vector<BlobStore::Leftover> BlobStore::old_blobs() const {
 
 std::vector<Digest> BlobStore::old_job_files() const {
   std::vector<Digest> jobs;
-  for (const fs::path& file : old_files(directory_ / "jobs", ".json")) {
+  for (const fs::path& file : old_files(directory_ / kJobs, ".json")) {
     if (const auto job = Digest::from_hex(file.stem().string())) jobs.push_back(*job);
   }
   return jobs;
 }
 
 fs::path BlobStore::job_file(const Digest& job) const {
-  return directory_ / "jobs" / (job.hex() + ".json");
+  return directory_ / kJobs / (job.hex() + ".json");
+}
+
+bool BlobStore::is_folder(const fs::path& entry) {
+  const std::string name = entry.filename().string();
+  const auto is_digit = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
+  return name == kJobs || (name.size() == 2 && std::ranges::all_of(name, is_digit));
 }
 
 fs::path BlobStore::path(const Digest& digest) const {

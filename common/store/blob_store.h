@@ -58,6 +58,8 @@ class BlobStore {
   /// Where workers save a job's document until it ends, so that a failed tile can be replayed
   /// alone.
   std::filesystem::path job_file(const Digest& job) const;
+  /// Whether an entry of a store's folder has the name of one of its folders.
+  static bool is_folder(const std::filesystem::path& entry);
 
   /// Where the blob is or would be.
   std::filesystem::path path(const Digest& digest) const;

@@ -63,14 +63,17 @@ std::optional<Hindrance> frame_hindrance(const fs::path& frame) {
   return closed_folder(frame.parent_path());
 }
 
-/// Its blobs lie one folder deeper.
+/// Blobs and documents lie one folder deeper.
 std::optional<Hindrance> store_hindrance(const fs::path& store) {
   if (auto closed = closed_folder(store)) return closed;
   std::error_code error;
   for (fs::directory_iterator entry(store, error), end; !error && entry != end;
        entry.increment(error)) {
+    if (!BlobStore::is_folder(entry->path())) continue;
     std::error_code gone;
-    if (!entry->is_directory(gone)) continue;
+    if (!entry->is_directory(gone) &&
+        entry->symlink_status(gone).type() != fs::file_type::not_found)
+      return Hindrance{"a folder in the place of " + entry->path().string()};
     if (auto closed = closed_folder(entry->path())) return closed;
   }
   return std::nullopt;
@@ -106,9 +109,10 @@ std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const Tas
 std::optional<Hindrance> find_hindrance(const FarmCore& farm, const LeaseId& lease) {
   const Scheduler::Job* job = job_of_open_task(farm, lease);
   if (job == nullptr) return std::nullopt;
-  return lease.task.kind == TaskKind::assemble
-             ? frame_hindrance(frame_path(job->spec, lease.task.frame()))
-             : store_hindrance(farm.store_directory);
+  std::optional<Hindrance> found;
+  if (lease.task.kind == TaskKind::assemble)
+    found = frame_hindrance(frame_path(job->spec, lease.task.frame()));
+  return found ? found : store_hindrance(farm.store_directory);
 }
 
 std::optional<std::vector<BlobRef>> find_bad_inputs(const FarmCore& farm, FileTable& files,

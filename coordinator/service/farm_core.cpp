@@ -287,12 +287,10 @@ Status FarmCore::perform(const RemoveBlobs& action) {
 
 // ---- what stands in the places of frames --------------------------------------------------------
 
-Result<FolderRecord*> FarmCore::record_of(const Digest& job, const JobSpec& spec) {
+Result<FolderRecord*> FarmCore::record_of(const Digest& job) {
   const auto known = records_.find(job);
   if (known != records_.end()) return &known->second;
-  BATON_ASSIGN(FolderRecord record,
-               FolderRecord::read(journal, history.jobs(), spec.output.directory, job,
-                                  history.jobs().of(job).id));
+  BATON_ASSIGN(FolderRecord record, FolderRecord::read(journal, history.jobs(), job));
   return &records_.emplace(job, std::move(record)).first->second;
 }
 
@@ -302,14 +300,14 @@ Result<std::vector<Digest>> FarmCore::replaceable(const LeaseId& lease) {
   const fs::path path = frame_path(spec, lease.task.frame());
   const Result<std::optional<FileStamp>> stamp = stamp_of(path);
   if (stamp && !*stamp) return std::vector<Digest>();
-  BATON_ASSIGN(FolderRecord* const record, record_of(lease.job, spec));
+  BATON_ASSIGN(FolderRecord* const record, record_of(lease.job));
   return record->replaceable(path);
 }
 
-Result<bool> FarmCore::may_replace(const Digest& job, const JobSpec& spec, const fs::path& path,
+Result<bool> FarmCore::may_replace(const Digest& job, const fs::path& path,
                                    const FileVerdict& picture) {
   records_.erase(job);
-  BATON_ASSIGN(FolderRecord* const record, record_of(job, spec));
+  BATON_ASSIGN(FolderRecord* const record, record_of(job));
   if (!record->may_replace(path, picture)) return false;
   record->give_up(path, picture.digest);
   return true;

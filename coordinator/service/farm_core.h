@@ -107,8 +107,8 @@ class FarmCore {
   std::optional<std::string> lost_mark(const Digest& job, const JobSpec& spec) const;
   /// Whether an open job may replace a picture that was found in the place of a frame. Then leases
   /// of it say so from now on.
-  Result<bool> may_replace(const Digest& job, const JobSpec& spec,
-                           const std::filesystem::path& path, const FileVerdict& picture);
+  Result<bool> may_replace(const Digest& job, const std::filesystem::path& path,
+                           const FileVerdict& picture);
   /// A person has said that the job may replace these.
   Status give_up(const Digest& job, const std::vector<FramesInDoubt::Frame>& frames);
   /// It may not any more: files of these names.
@@ -156,7 +156,7 @@ class FarmCore {
   Status perform(const ReportConflict& action);
   Status perform(const RemoveBlobs& action);
 
-  Result<FolderRecord*> record_of(const Digest& job, const JobSpec& spec);
+  Result<FolderRecord*> record_of(const Digest& job);
   Result<std::vector<Digest>> replaceable(const LeaseId& lease);
 
   struct Outgoing {

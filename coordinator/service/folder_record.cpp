@@ -8,17 +8,47 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
+#include "common/job/text/picture.h"
 #include "common/store/frame_locks.h"
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
+#include "coordinator/service/neighbour.h"
 
 namespace baton {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Those frames of a job that another one would make again as they are, or with more sweeps.
+std::set<FrameIndex> made_again(const ParsedJobDocument& theirs, std::set<FrameIndex> frames,
+                                const ParsedJobDocument& mine) {
+  if (frames.empty() || theirs.picture != mine.picture) return {};
+  const FramesByFile by_file(mine);
+  const FrameComparison comparison(theirs, mine);
+  const bool has_more_sweeps = mine.job.quality.sweeps > theirs.job.quality.sweeps;
+  std::erase_if(frames, [&](FrameIndex frame) {
+    const std::optional<FrameIndex> place = by_file.find(theirs.job, frame);
+    if (!place) return true;
+    return has_more_sweeps ? !comparison.are_alike(frame, *place)
+                           : !comparison.are_equal(frame, *place);
+  });
+  return frames;
+}
+
+}  // namespace
+
 Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jobs,
-                                        const std::string& folder, const Digest& version,
-                                        const JobId& id) {
+                                        const Digest& version) {
+  BATON_ASSIGN(const SharedDocument document, journalled_document(journal, version));
+  if (!document->parsed) return document->parsed.error();
+  return read(journal, jobs, *document->parsed, jobs.of(version).id);
+}
+
+Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jobs,
+                                        const ParsedJobDocument& document, const JobId& id) {
+  const std::string& folder = document.job.output.directory;
+  const Digest& version = document.digest;
   FolderRecord record;
   record.version_ = version;
   record.family_ = jobs.versions(id);
@@ -29,9 +59,9 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
   for (const auto& [file, picture] : given_up) record.given_up_[fs::path(folder) / file] = picture;
   BATON_ASSIGN(const std::vector<Digest> neighbours, jobs_in_folder(journal, folder));
   for (const Digest& other : neighbours) {
-    BATON_ASSIGN(const SharedDocument document, journalled_document(journal, other));
-    if (!document->parsed) continue;
-    const JobSpec& spec = document->parsed->job;
+    BATON_ASSIGN(const SharedDocument written, journalled_document(journal, other));
+    if (!written->parsed) continue;
+    const JobSpec& spec = written->parsed->job;
     const auto path_of = [&](FrameIndex frame) {
       return fs::path(folder) /
              frame_file_name(spec.output.pattern, spec.frames[frame.index()].value());
@@ -40,12 +70,15 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
     BATON_ASSIGN(writer.renderers, journal.renderers(other));
     BATON_ASSIGN(const auto granted, journal.frame_files(other));
     std::map<fs::path, std::int64_t> rendered;
+    std::set<FrameIndex> may_be_there;
     for (const auto& [frame, file] : granted) {
       if (frame.index() >= spec.frames.size()) continue;
-      const fs::path path = path_of(frame);
-      if (!file.is_gone) writer.granted.insert(path);
-      if (file.rendered != 0) rendered[path] = file.rendered;
+      if (!file.is_gone) may_be_there.insert(frame);
+      if (file.rendered != 0) rendered[path_of(frame)] = file.rendered;
     }
+    const bool is_of_job = std::ranges::find(record.family_, other) != record.family_.end();
+    if (!is_of_job) may_be_there = made_again(*written->parsed, may_be_there, document);
+    for (const FrameIndex frame : may_be_there) writer.granted.insert(path_of(frame));
     // What another job had when it ended, less what it has lost since.
     std::optional<std::set<FrameNumber>> has;
     if (jobs.of(other).id != id) {
@@ -134,9 +167,7 @@ bool FolderRecord::may_be_unreported(const fs::path& path, const FileVerdict& pi
       images != images_.end() && std::ranges::any_of(images->second, [&](const Image& image) {
         return image.job == job && !image.is_lost && !image.image.is_placeholder();
       });
-  const bool is_of_job = std::ranges::find(family_, job) != family_.end();
-  return is_by_us && !is_reported &&
-         (job == version_ || (is_of_job && writer->second.granted.contains(path)));
+  return is_by_us && !is_reported && (job == version_ || writer->second.granted.contains(path));
 }
 
 std::optional<Digest> FolderRecord::writer_of(const FileVerdict& picture) const {

@@ -23,19 +23,22 @@ namespace baton {
 /// former one's back has replaced it.
 class FolderRecord {
  public:
-  /// version: the digest of the job's document, which the journal may not have yet; what it has
-  /// written counts in any case. id: the job; empty: it is new.
+  /// document: the job's, which the journal may not have yet; what it has written counts in any
+  /// case. id: the job; empty: it is new.
   static Result<FolderRecord> read(Journal& journal, const IdentityBook& jobs,
-                                   const std::string& folder, const Digest& version,
-                                   const JobId& id);
+                                   const ParsedJobDocument& document, const JobId& id);
+  /// Of one that the journal has.
+  static Result<FolderRecord> read(Journal& journal, const IdentityBook& jobs,
+                                   const Digest& version);
 
   /// What the file of a frame may be, as far as it is recorded.
   std::vector<BlobRef> images_of(const std::filesystem::path& path) const;
   /// Whether a picture in the place of a frame may be replaced: a person has given it up, or it is
   /// a job's of this folder, one that is recorded, or one that was written and never reported: of
-  /// the version itself, which will make it again, or of another one of the job where a worker was
-  /// granted it; by what the job is rendered with here, or else it is another coordinator's. None
-  /// that is locked (common/store/frame_locks.h), none while that cannot be read.
+  /// the version itself, which will make it again, or of another one of the job, or of the same
+  /// picture, where a worker was granted it; by what the job is rendered with here, or else it is
+  /// another coordinator's. None that is locked (common/store/frame_locks.h), none while that
+  /// cannot be read.
   bool may_replace(const std::filesystem::path& path, const FileVerdict& picture) const {
     return is_recorded(path, picture) || may_be_unreported(path, picture);
   }
@@ -75,8 +78,9 @@ class FolderRecord {
   /// By others, by name; nullopt: that cannot be read.
   std::optional<std::map<std::string, std::string>> locked_;
   struct Writer {
-    std::set<std::string> renderers;          ///< Journal::renderers
-    std::set<std::filesystem::path> granted;  ///< frames that its workers may have written
+    std::set<std::string> renderers;  ///< Journal::renderers
+    /// Frames that its workers may have written; of another job those of the same picture.
+    std::set<std::filesystem::path> granted;
   };
   std::map<Digest, Writer> jobs_;
   Digest version_;              ///< the one that was asked for

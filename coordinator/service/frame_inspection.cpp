@@ -83,9 +83,7 @@ Result<InspectedFrames> inspect_frames(const Scheduler::Job& job,
   if (pictures.empty()) return found;
 
   // A worker of a former job may have written late.
-  BATON_ASSIGN(
-      const FolderRecord record,
-      FolderRecord::read(journal, jobs, job.spec.output.directory, version, jobs.of(version).id));
+  BATON_ASSIGN(const FolderRecord record, FolderRecord::read(journal, jobs, version));
   for (const auto& [path, picture] : pictures) {
     if (record.may_replace(path, picture.second)) {
       lose(picture.first, path);

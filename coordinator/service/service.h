@@ -91,7 +91,7 @@ class Service {
   Status receive(const PeerId& peer, const SubmitJob& message);
   Status receive(const PeerId& peer, const AskRequeue& message);
   Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
-                                                const JobVersion& version, const JobSpec& spec,
+                                                const ParsedJobDocument& document, const JobId& id,
                                                 const LockedFrames& locked);
 
   // Files that must be read before a message can be handled.

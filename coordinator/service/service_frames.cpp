@@ -27,7 +27,7 @@ Status Service::judge_place(const std::string& worker, const LeaseReturn& messag
   if (!is_frame) return farm_.step(LeaseReturned{worker, lease});
   const std::filesystem::path path = frame_path(job->spec, lease.task.frame());
   BATON_ASSIGN(const bool may_go,
-               farm_.may_replace(lease.job, job->spec, path,
+               farm_.may_replace(lease.job, path,
                                  {FileState::strange, {}, message.in_place, message.writer}));
   if (!may_go)
     tell(fmt::format("job {}: {} is another picture, and stays", farm_.history.name_of(lease.job),

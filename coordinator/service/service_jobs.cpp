@@ -195,8 +195,10 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
   const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
   if (known != nullptr && known->status == JobStatus::paused) {
     BATON_TRY(LockKeeper(farm_).settle(known->spec));
+    BATON_ASSIGN(const SharedDocument document, journalled_document(farm_.journal, *job));
+    if (!document->parsed) return farm_.refuse(peer, document->parsed.error());
     BATON_ASSIGN(const std::optional<OddFrames> odd,
-                 await_frames(peer, message, {*job, farm_.history.jobs().of(*job).id}, known->spec,
+                 await_frames(peer, message, *document->parsed, farm_.history.jobs().of(*job).id,
                               farm_.locked(*job, known->spec)));
     if (!odd) return {};
     BATON_ASSIGN(LostFiles lost, Submission(farm_, files_, speaker_).lost_files_of(*job));
@@ -260,7 +262,7 @@ Status Service::receive(const PeerId& peer, const LockFrames& message) {
   if (!is_open_now && !is_away) {
     const LockedFrames locked(document->job, after);
     BATON_ASSIGN(const std::optional<OddFrames> odd,
-                 await_frames(peer, message, {*job, id}, document->job, locked));
+                 await_frames(peer, message, *document, id, locked));
     if (!odd) return {};
   }
   // A lock that others cannot see is none: they would replace the frame.
@@ -289,8 +291,7 @@ Status Service::end_as_frames_stand(const ParsedJobDocument& document, const Job
                                     const std::vector<FrameNumber>* unlocked) {
   const JobSpec& spec = document.job;
   BATON_ASSIGN(const FolderRecord record,
-               FolderRecord::read(farm_.journal, farm_.history.jobs(), spec.output.directory,
-                                  version.document, version.id));
+               FolderRecord::read(farm_.journal, farm_.history.jobs(), document, version.id));
   std::string fault =
       fault_text(find_odd_frames(record, files_, spec, LockedFrames(spec, locked)), version.id);
   if (unlocked != nullptr && fault.empty()) {

@@ -132,7 +132,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   if (!free) return farm_.refuse(peer, free.error());
   const LockedFrames locked(document->job, farm_.history.jobs().locked(id));
   BATON_ASSIGN(const std::optional<OddFrames> odd,
-               await_frames(peer, message, {document->digest, id}, document->job, locked));
+               await_frames(peer, message, *document, id, locked));
   if (!odd) return {};
   for (const FramesInDoubt::Frame& frame : odd->doubt.strange) {
     const Status own = frame.writer      ? farm_.check_own(speaker_, *frame.writer)
@@ -166,19 +166,19 @@ Status Service::receive(const PeerId& peer, const AskRequeue& message) {
   BATON_ASSIGN(JournalledJob known, farm_.journal.load(*job));
   JobSpec spec = shared->parsed->job;
   spec.leading_runs = known.plan.leading_runs;
-  const JobVersion version{*job, farm_.history.jobs().of(*job).id};
+  const JobId id = farm_.history.jobs().of(*job).id;
   const LockedFrames locked = farm_.locked(*job, spec);
   const auto frames = frames_to_requeue(spec, message.frames, locked);
   if (!frames) return farm_.refuse(peer, frames.error());
   const bool is_open_now = is_open(known.status);
   Submission submission(farm_, files_, speaker_);
   if (!is_open_now) {
-    const Status strange = expect_no_strange_locks(spec, farm_.history.jobs(), version.id);
+    const Status strange = expect_no_strange_locks(spec, farm_.history.jobs(), id);
     if (!strange) return farm_.refuse(peer, strange.error());
     BATON_ASSIGN(const std::optional<OddFrames> odd,
-                 await_frames(peer, message, version, spec, locked));
+                 await_frames(peer, message, *shared->parsed, id, locked));
     if (!odd) return {};
-    const std::string fault = fault_text(*odd, version.id);
+    const std::string fault = fault_text(*odd, id);
     if (!fault.empty())
       return farm_.refuse(peer, {ErrorKind::io, fmt::format("job '{}': {}", spec.name, fault)});
     if (const Status is_free = submission.expect_free_folder(*shared->parsed); !is_free)
@@ -202,16 +202,16 @@ Status Service::receive(const PeerId& peer, const AskRequeue& message) {
 /// The frames that a message about a job would replace or keep. nullopt: some must be read, and the
 /// message waits.
 Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const Message& message,
-                                                       const JobVersion& version,
-                                                       const JobSpec& spec,
+                                                       const ParsedJobDocument& document,
+                                                       const JobId& id,
                                                        const LockedFrames& locked) {
   const TimePoint now = std::chrono::steady_clock::now();
   const Incoming incoming{peer, message, speaker_};
-  const Digest& job = version.document;
+  const Digest& job = document.digest;
+  const JobSpec& spec = document.job;
   if (waits_->join(job, incoming, now)) return std::optional<OddFrames>();
   BATON_ASSIGN(const FolderRecord record,
-               FolderRecord::read(farm_.journal, farm_.history.jobs(), spec.output.directory, job,
-                                  version.id));
+               FolderRecord::read(farm_.journal, farm_.history.jobs(), document, id));
   const auto* const submitted = std::get_if<SubmitJob>(&message);
   OddFrames odd = find_odd_frames(record, files_, spec, locked,
                                   /*restart=*/submitted != nullptr && submitted->restart);

@@ -4,6 +4,7 @@ that change while a job runs, and a coordinator with few file descriptors."""
 
 import os
 import resource
+import shutil
 from pathlib import Path
 
 from assets import write_map
@@ -100,6 +101,24 @@ def a_file_in_place_of_the_store_is_waited_for(programs, folder):
         farm.wait_for(ident)
         check_equal(farm.show(ident)["failures"], [], "failures")
     check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
+def a_file_in_place_of_a_folder_of_the_store_is_waited_for(programs, folder):
+    expected = programs.rendered(folder / "witness", moving(folder / "witness"))
+    for number, names in enumerate((["jobs"], [f"{first:02x}" for first in range(256)])):
+        with Farm(programs, folder / f"farm{number}") as farm:
+            shutil.rmtree(folder / "frames", ignore_errors=True)
+            ident = farm.submit(write_job(folder / "job.json", moving(folder)))
+            places = [farm.work_folder / "store" / name for name in names]
+            for place in places:
+                place.write_text("no folder", encoding="ascii")
+            farm.start_worker()
+            wait_until(lambda: "a folder in the place of" in farm.show(ident).get("waits", ""), "it waits")
+            for place in places:
+                place.unlink()
+            farm.wait_for(ident)
+            check_equal(farm.show(ident)["failures"], [], "failures")
+        check_equal(programs.pixels(folder / "frames"), expected, "pixels")
 
 
 def an_input_that_changes_reaches_no_frame_in_silence(programs, folder):

@@ -173,21 +173,42 @@ TEST_F(FramesTest, AFormerDocumentAgainReplacesTheNewerOnes) {
   }
 }
 
-// Written, and never reported: it is its job's, and no other replaces it unasked.
-TEST_F(FramesTest, AnotherJobReplacesNothingThatWasOnlyGranted) {
+// Written, and never reported: what makes the same picture goes on as if it were; no other
+// replaces it unasked.
+TEST_F(FramesTest, WhatWasOnlyGrantedIsOfItsPicture) {
   const RunningService service(options);
   const Digest former = submit_former(service.endpoint());
   FakeWorker late(service.endpoint(), store(), job, "late");
   late.hello();
   wait_for_frame_2(late);
-  put(2, std::string(kPicture) + writer_of(former));
-  ask<ShownJob>(service.endpoint(), CancelJob{former.hex()});
+  const std::string written = std::string(kPicture) + writer_of(former);
+  put(2, written);
+  put(3, written);  // of which nobody had a lease
   JobSpec other = job;
   other.name = "other";
-  const std::string theirs = make_job_document(other).value();
-  EXPECT_THAT(refused(service.endpoint(), SubmitJob{theirs}).message,
-              HasSubstr("frame.0002.exr is not what a job has written"));
-  ask<JobAccepted>(service.endpoint(), SubmitJob{theirs, true});
+  const auto submit = [&](const JobSpec& what, bool restart = false) {
+    return SubmitJob{make_job_document(what).value(), restart};
+  };
+  EXPECT_THAT(refused(service.endpoint(), submit(other)).message,
+              HasSubstr("frame.0003.exr is not what a job has written"));
+  fs::remove(frame(3));
+  JobSpec brighter = other;
+  brighter.seed += 1;
+  const auto expect_kept = [&] {
+    EXPECT_THAT(refused(service.endpoint(), submit(brighter)).message,
+                HasSubstr("frame.0002.exr is not what a job has written"));
+  };
+  expect_kept();
+  const Digest next = ask<JobAccepted>(service.endpoint(), submit(other)).version;
+  EXPECT_EQ(ask<ShownJob>(service.endpoint(), ShowJob{former.hex()}).detail.summary.status,
+            JobStatus::cancelled);
+  const LeaseId lease = wait_for_frame_2(late);
+  late.say(LeaseReturn{lease, {}, {}, digest_of(written), writer_of(former)});
+  wait_for_frame_2(late);
+  EXPECT_THAT(granted, testing::Contains(digest_of(written)));
+  ask<ShownJob>(service.endpoint(), CancelJob{next.hex()});
+  expect_kept();
+  ask<JobAccepted>(service.endpoint(), submit(brighter, true));
 }
 
 // Once the frame is rendered, the picture that was given up for it is somebody's again.
