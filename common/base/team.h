@@ -18,6 +18,16 @@ inline void do_in_turn(std::size_t parts, const std::function<void(std::size_t)>
   for (std::size_t i = 0; i < parts; ++i) part(i);
 }
 
+/// Has a thread that has nothing to do begin something at once; false: there is none, and nobody
+/// does it.
+using Lend = std::function<bool(std::function<void()> work)>;
+inline bool lend_nobody(const std::function<void()>&) { return false; }
+
+/// Does parts (DoParts) on the calling thread, with whoever has nothing to do meanwhile. Traces
+/// have the whole and its parts under the name `what`.
+void share_parts(const Lend& lend, const std::string& what, std::size_t parts,
+                 const std::function<void(std::size_t)>& part);
+
 /// A mutex whose waiters help: what one thread makes while others wait for it is made in parts by
 /// all of them. Traces have the parts under the name of the whole.
 class Team {

@@ -150,7 +150,7 @@ TraceFile& trace() {
 
 std::string_view span_kind_name(SpanKind kind) {
   constexpr std::array<std::string_view, static_cast<std::size_t>(last_of(SpanKind())) + 1> kNames{
-      "task", "frame", "make", "help", "wait", "read", "write", "phase", "publish"};
+      "task", "frame", "make", "help", "wait", "share", "read", "write", "phase", "publish"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

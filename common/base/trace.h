@@ -24,6 +24,8 @@ enum class SpanKind : std::uint8_t {
   make,
   help,  ///< a part of what another thread makes
   wait,  ///< for what another thread makes
+  /// What a thread does together with those who have nothing to do; each does parts of it (help).
+  share,
   read,
   write,
   phase,    ///< of a program's life

@@ -154,7 +154,7 @@ Bytes encode_planes(const std::string& name, const Imf::Header& header, const Fi
   }
   MemoryStream stream(name.c_str());
   {
-    Imf::OutputFile file(stream, header, kOpenExrThreads);
+    Imf::OutputFile file(stream, header, kOpenExrWriters);
     file.setFrameBuffer(frame_buffer);
     file.writePixels(image.rect.height());
   }

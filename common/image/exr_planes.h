@@ -7,8 +7,11 @@
 
 namespace baton {
 
-/// OpenEXR works on the calling thread: the worker has its own threads.
+/// OpenEXR works on the calling thread, and on those that it is lent (exr_threads.h).
 inline constexpr int kOpenExrThreads = 0;
+/// For how many threads OpenEXR keeps blocks of lines in hand when it writes: two for each, of some
+/// megabytes.
+inline constexpr int kOpenExrWriters = 4;
 
 /// The address that pixel (0, 0) would have, which OpenEXR wants, where `rect` is stored from
 /// `base`.

@@ -113,8 +113,15 @@ void FolderRecord::mark_superseded() {
   const auto is_of_job = [&](const Image& image) { return age(image) < std::ssize(family_); };
   const auto is_there = [](const Image& image) { return !image.image.is_placeholder(); };
   for (auto& [path, images] : images_) {
-    std::ptrdiff_t newest = -1;
+    // One that was kept is as new as when it was rendered, by whichever job.
+    std::map<Digest, std::int64_t> rendered;
     for (const Image& image : images) {
+      std::int64_t& last = rendered[image.image.digest];
+      if (is_there(image)) last = std::max(last, image.rendered);
+    }
+    std::ptrdiff_t newest = -1;
+    for (Image& image : images) {
+      if (is_there(image)) image.rendered = rendered[image.image.digest];
       if (is_of_job(image) && is_there(image)) newest = std::max(newest, age(image));
     }
     for (Image& image : images) {

@@ -27,8 +27,10 @@ using Thread = std::pair<std::int32_t, std::int32_t>;
 class Dissection {
  public:
   explicit Dissection(const Trace& trace) {
-    for (const TracedSpan& span : trace.spans)
+    for (const TracedSpan& span : trace.spans) {
       by_thread_[{span.process, span.thread}].push_back(&span);
+      if (span.kind == SpanKind::help) helps_[{span.process, span.name}].push_back(&span);
+    }
     for (auto& [thread, spans] : by_thread_) add_thread(spans);
     join_tasks();
     join_works();
@@ -60,6 +62,7 @@ class Dissection {
   struct Stretch {
     std::int32_t step = -1;
     double busy_s = 0;
+    std::vector<PlayedTask::Piece> shares = {};
   };
   struct Work {
     double made_s = 0, own_help_s = 0;
@@ -87,6 +90,7 @@ class Dissection {
   void add_task(const TracedSpan& task, const std::vector<const TracedSpan*>& inside) {
     Found found{&task, {{-1, cpu_of(task)}}};
     double frame_end_s = 0, work_end_s = 0, io_end_s = 0;
+    const TracedSpan* share = nullptr;
     std::string work;
     bool is_made_here = false;
     for (const TracedSpan* span : inside) {
@@ -112,6 +116,11 @@ class Dissection {
         work_end_s = span->end_s();
         work = span->name;
         is_made_here = span->kind == SpanKind::make;
+      } else if (span->kind == SpanKind::share && span->start_s >= work_end_s) {
+        share = span;
+        stretch.shares.push_back(parts_of(*span));
+      } else if (span->kind == SpanKind::help && share != nullptr && is_part_of(*span, *share)) {
+        stretch.busy_s -= cpu_of(*span);
       } else if (span->kind == SpanKind::help) {
         Work& of = works_[{task.task.job, span->name}];
         of.help_s += cpu_of(*span);
@@ -124,6 +133,24 @@ class Dissection {
       }
     }
     if (!task.task.is_lost && !task.task.kind.empty()) found_.push_back(std::move(found));
+  }
+  static bool is_part_of(const TracedSpan& part, const TracedSpan& share) {
+    constexpr double kRounding = 1e-6;
+    return part.name == share.name && part.start_s >= share.start_s - kRounding &&
+           part.end_s() <= share.end_s() + kRounding;
+  }
+  /// By whoever did them.
+  PlayedTask::Piece parts_of(const TracedSpan& share) const {
+    PlayedTask::Piece piece;
+    const auto found = helps_.find({share.process, share.name});
+    if (found == helps_.end()) return piece;
+    for (const TracedSpan* part : found->second) {
+      if (!is_part_of(*part, share)) continue;
+      ++piece.parts;
+      piece.part_s += cpu_of(*part);
+    }
+    if (piece.parts > 0) piece.part_s /= static_cast<double>(piece.parts);
+    return piece;
   }
   /// Busy time of a work, reading and writing in it included.
   static double busy_of(const TracedSpan& work, const std::vector<const TracedSpan*>& inside) {
@@ -172,8 +199,9 @@ class Dissection {
         const bool is_first = &stretch == &found.stretches.front();
         if (stretch.step >= 0 || is_first)
           piece.works = needed[{found.span->task.job, stretch.step}];
-        if (piece.seconds > 0 || !piece.works.empty())
-          played_.tasks[i].pieces.push_back(std::move(piece));
+        std::vector<PlayedTask::Piece>& pieces = played_.tasks[i].pieces;
+        if (piece.seconds > 0 || !piece.works.empty()) pieces.push_back(std::move(piece));
+        pieces.insert(pieces.end(), stretch.shares.begin(), stretch.shares.end());
       }
     }
   }
@@ -214,6 +242,7 @@ class Dissection {
   }
 
   std::map<Thread, std::vector<const TracedSpan*>> by_thread_;
+  std::map<std::pair<std::int32_t, std::string>, std::vector<const TracedSpan*>> helps_;
   std::vector<Found> found_;
   /// Of found_, by the number of the played task.
   std::vector<std::size_t> kept_;
@@ -245,6 +274,7 @@ class Player {
       events_.pop();
       now_s_ = event.time_s;
       if (event.kind == EventKind::piece_done) end_piece(event.number);
+      if (event.kind == EventKind::part_done) end_part(event.number, event.version != 0);
       if (event.kind == EventKind::published) release(event.number);
       if (event.kind == EventKind::work_done && works_[event.number].version == event.version)
         end_work(event.number);
@@ -254,12 +284,13 @@ class Player {
   }
 
  private:
-  enum class EventKind { piece_done, published, work_done };
+  enum class EventKind { piece_done, part_done, published, work_done };
   struct Event {
     double time_s;
     EventKind kind;
-    std::size_t number;   ///< of the task or work
-    std::size_t version;  ///< of the work's state
+    std::size_t number;  ///< of the task or work
+    /// Of the work's state; of a part: 1 where a helper does it.
+    std::size_t version;
     std::size_t order;
 
     bool operator>(const Event& other) const {
@@ -271,6 +302,7 @@ class Player {
     std::vector<std::size_t> followers;
     std::size_t piece = 0, work = 0;  ///< at which it is
     double work_since_s = 0;
+    std::size_t parts_left = 0, parts_begun = 0;  ///< begun: and not done
     double end_s = 0;
     std::optional<std::size_t> cause;  ///< whose result came last
     double busy_s = 0;
@@ -288,6 +320,10 @@ class Player {
     events_.push({time_s, kind, number, version, next_order_++});
   }
   void begin_ready() {
+    while (free_ > 0 && !sharing_.empty()) {
+      --free_;
+      begin_part(*sharing_.begin(), /*is_helper=*/true);
+    }
     while (free_ > 0 && !ready_.empty()) {
       --free_;
       const std::size_t task = ready_.top();
@@ -309,8 +345,28 @@ class Player {
       }
       ++task.work;
     }
+    if (piece.parts > 0) {
+      task.parts_left = piece.parts;
+      sharing_.insert(number);
+      return begin_part(number, /*is_helper=*/false);
+    }
     task.busy_s += piece.seconds;
     add(now_s_ + piece.seconds, EventKind::piece_done, number);
+  }
+  void begin_part(std::size_t number, bool is_helper) {
+    Task& task = tasks_[number];
+    const double part_s = trace_.tasks[number].pieces[task.piece].part_s;
+    if (--task.parts_left == 0) sharing_.erase(number);
+    ++task.parts_begun;
+    if (!is_helper) task.busy_s += part_s;
+    add(now_s_ + part_s, EventKind::part_done, number, is_helper ? 1 : 0);
+  }
+  void end_part(std::size_t number, bool is_helper) {
+    Task& task = tasks_[number];
+    --task.parts_begun;
+    if (task.parts_left > 0) return begin_part(number, is_helper);
+    if (is_helper) ++free_;
+    if (task.parts_begun == 0) end_piece(number);
   }
   void end_piece(std::size_t number) {
     Task& task = tasks_[number];
@@ -379,6 +435,7 @@ class Player {
   std::size_t last_ = 0, next_order_ = 0;
   std::vector<Task> tasks_;
   std::vector<Work> works_;
+  std::set<std::size_t> sharing_;  ///< tasks with parts that nobody has begun
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   std::priority_queue<std::size_t, std::vector<std::size_t>, std::greater<>> ready_;
 };
@@ -388,7 +445,8 @@ class Player {
 double PlayedTrace::work_s() const {
   double sum_s = 0;
   for (const PlayedTask& task : tasks) {
-    for (const PlayedTask::Piece& piece : task.pieces) sum_s += piece.seconds;
+    for (const PlayedTask::Piece& piece : task.pieces)
+      sum_s += piece.seconds + static_cast<double>(piece.parts) * piece.part_s;
   }
   for (const SharedWork& work : works) sum_s += work.alone_s + work.shared_s;
   return sum_s;

@@ -21,7 +21,10 @@ struct PlayedTask {
   /// Something to do, once works are there.
   struct Piece {
     std::vector<std::size_t> works;  ///< needed before
-    double seconds = 0;
+    double seconds = 0;              ///< that its thread does alone
+    /// What it then does together with threads that have nothing to do.
+    std::size_t parts = 0;
+    double part_s = 0;
   };
   std::string kind;  ///< task_name()
   double began_s = 0;
@@ -59,7 +62,8 @@ struct Playback {
 };
 
 /// List scheduling: a thread that is free takes the task that began first of those whose results
-/// are there. Whoever comes first to a work makes it; the others wait, or help. threads: > 0.
+/// are there, after the parts of what others share. Whoever comes first to a work makes it; the
+/// others wait, or help. threads: > 0.
 Playback play(const PlayedTrace& trace, std::size_t threads);
 
 }  // namespace baton

@@ -194,6 +194,7 @@ void keep_job(Trace& trace, std::string_view id) {
   }
   // Spans of a thread come in the order of their starts, so the last task began before.
   std::map<Thread, double> own_until;
+  std::map<std::pair<std::int32_t, std::string>, double> shared_until;
   std::vector<TracedSpan> kept;
   for (TracedSpan& span : trace.spans) {
     const Thread thread(span.process, span.thread);
@@ -209,7 +210,12 @@ void keep_job(Trace& trace, std::string_view id) {
       }
       kept.push_back(std::move(span));
     } else if (own_until.contains(thread) && span.end_s() <= own_until[thread]) {
+      if (span.kind == SpanKind::share) shared_until[{span.process, span.name}] = span.end_s();
       kept.push_back(std::move(span));
+    } else if (span.kind == SpanKind::help && threads.contains(thread)) {
+      const auto shared = shared_until.find({span.process, span.name});
+      if (shared != shared_until.end() && span.start_s < shared->second)
+        kept.push_back(std::move(span));
     }
   }
   trace.spans = std::move(kept);

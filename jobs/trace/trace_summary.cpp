@@ -74,6 +74,13 @@ TraceSummary summarize(const Trace& trace, const std::vector<std::size_t>& threa
       add_stretch(summary.busy_over_time, slice_s, from_s, to_s, 1);
       continue;
     }
+    if (span.kind == SpanKind::help && span.start_s >= now.task_end_s) {
+      seen.insert(thread);
+      done["helping with " + without_number(span.name)] += span.seconds;
+      busy_s += span.seconds;
+      add_stretch(summary.busy_over_time, slice_s, from_s, to_s, 1);
+      continue;
+    }
     // Works and waits that lie in no other; who helps meanwhile does not wait.
     if (span.kind == SpanKind::help && span.end_s() <= now.part_end_s && !now.waits_for.empty()) {
       waited[now.waits_for] -= span.seconds;

@@ -236,40 +236,56 @@ Result<Plate> read_plate(const LoadedJob& loaded, FrameNumber number) {
   return plate;
 }
 
+/// The whole image, of one film a tile. Inputs: those of a step, in any order.
+Result<FilmTile> join_films(const LoadedJob& loaded, const PatientStore& store, Step step,
+                            const std::vector<BlobRef>& inputs, const Lend& lend) {
+  const TileGrid grid(loaded.job.image);
+  std::vector<bool> is_there(inputs.size(), false);
+  for (const BlobRef& input : inputs) {
+    const bool fits = input.kind == BlobKind::film && input.step() == step && input.tile >= 0 &&
+                      input.tile < grid.count() && !is_there[static_cast<std::size_t>(input.tile)];
+    if (!fits)
+      return Error{ErrorKind::bad_input,
+                   fmt::format("{}: is not a new tile of step {}", blob_name(input), step)};
+    is_there[static_cast<std::size_t>(input.tile)] = true;
+  }
+
+  const FilmPass pass = loaded.job.visibility.correlated ? FilmPass::second : FilmPass::first;
+  FilmTile image;
+  const auto paste = [&](const BlobRef& input) -> Status {
+    if (store.stop().stop_requested())
+      return Error{ErrorKind::cancelled, "stopped while assembling"};
+    BATON_ASSIGN(const FilmTile film, read_film(loaded, store, input, pass));
+    if (film.rect != grid.rect(input.tile))
+      return Error{ErrorKind::bad_input,
+                   fmt::format("{}: has not the pixels of its tile", blob_name(input))};
+    if (image.channels.empty()) image = blank_image(loaded.job.image.rendered(), film.channels);
+    return paste_tile(film, image);
+  };
+  // The first says which channels there are.
+  BATON_TRY(paste(inputs.front()));
+  std::vector<Status> pasted(inputs.size() - 1);
+  share_parts(lend, fmt::format("tiles of step {}", step), pasted.size(),
+              [&](std::size_t i) { pasted[i] = paste(inputs[i + 1]); });
+  for (const Status& one : pasted) BATON_TRY(one);
+  return image;
+}
+
 Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore& store,
-                                    const Grant& grant) {
+                                    const Grant& grant, const Lend& lend) {
   const TaskKey& task = grant.lease.task;
   const std::vector<BlobRef>& inputs = grant.inputs;
-  const TileGrid grid(loaded.job.image);
+  const std::int32_t num_tiles = TileGrid(loaded.job.image).count();
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
   const FrameIndex frame = task.frame();
   if (frame < FrameIndex(0) || frame >= FrameIndex(num_frames) ||
-      inputs.size() != static_cast<std::size_t>(grid.count())) {
+      inputs.size() != static_cast<std::size_t>(num_tiles)) {
     return Error{ErrorKind::bad_input,
                  fmt::format("frame index {} of {}: got {} films, expected {}", frame, num_frames,
-                             inputs.size(), grid.count())};
+                             inputs.size(), num_tiles)};
   }
-
-  // Paste every tile of the last sweep once.
-  const Step step = Timeline(loaded.job).last_step_of(frame);
-  FilmTile image;
-  std::vector<bool> pasted(inputs.size(), false);
-  for (const BlobRef& input : inputs) {
-    if (store.stop().stop_requested())
-      return Error{ErrorKind::cancelled, "stopped while assembling"};
-    const FilmPass pass = loaded.job.visibility.correlated ? FilmPass::second : FilmPass::first;
-    BATON_ASSIGN(const FilmTile film, read_film(loaded, store, input, pass));
-    const bool fits = input.kind == BlobKind::film && input.step() == step && input.tile >= 0 &&
-                      input.tile < grid.count() && film.rect == grid.rect(input.tile) &&
-                      !pasted[static_cast<std::size_t>(input.tile)];
-    if (!fits) {
-      return Error{ErrorKind::bad_input,
-                   fmt::format("{}: is not a new tile of frame index {}", blob_name(input), frame)};
-    }
-    if (image.channels.empty()) image = blank_image(loaded.job.image.rendered(), film.channels);
-    BATON_TRY(paste_tile(film, image));
-    pasted[static_cast<std::size_t>(input.tile)] = true;
-  }
+  const Step last_sweep = Timeline(loaded.job).last_step_of(frame);
+  BATON_ASSIGN(FilmTile image, join_films(loaded, store, last_sweep, inputs, lend));
 
   std::optional<RgbImage> plate_image;
   std::vector<std::string> notes;
@@ -293,7 +309,7 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
   };
   const Result<WrittenFrame> written =
       write_frame(loaded.job, loaded.digest, frame, std::move(image), plate_image, may_replace,
-                  store.stop(), loaded.roots);
+                  store.stop(), loaded.roots, lend);
   if (!written && other) return TaskResult{.made = {}, .in_place = std::move(other)};
   if (!written && written.error().kind == ErrorKind::timeout) {
     TaskResult unseen;
@@ -312,7 +328,8 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const PatientStore&
 }  // namespace
 
 Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const Grant& grant,
-                                const std::stop_token& stop, std::vector<BlobRef>* left) {
+                                const std::stop_token& stop, std::vector<BlobRef>* left,
+                                const Lend& lend) {
   const TaskKey& task = grant.lease.task;
   const PatientStore patient(store, stop);
   loaded.states->release_before(grant.states_from);
@@ -322,7 +339,7 @@ Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const
     case TaskKind::second_pass:
       return execute_second_pass(loaded, patient, task, grant.inputs);
     case TaskKind::assemble:
-      return execute_assemble(loaded, patient, grant);
+      return execute_assemble(loaded, patient, grant, lend);
   }
   return Error{ErrorKind::bad_input, "unknown kind of task"};
 }

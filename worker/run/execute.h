@@ -44,9 +44,10 @@ struct TaskEnded {
 /// Deterministic. With an empty span of steps a render task's state is cut and joined from its
 /// inputs. Errors: a missing or damaged input, the disk, bad input of the renderer;
 /// ErrorKind::cancelled when `stop` is requested. After one, `left` is what had been put into the
-/// store.
+/// store. An assembly is shared with who is lent.
 Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const Grant& grant,
-                                const std::stop_token& stop, std::vector<BlobRef>* left = nullptr);
+                                const std::stop_token& stop, std::vector<BlobRef>* left = nullptr,
+                                const Lend& lend = lend_nobody);
 
 /// Packs held states of a job into the store. Errors: the disk.
 Result<std::vector<PublishedState>> publish_held(const JobStates::List& states, BlobStore& store);

@@ -12,6 +12,7 @@
 #include "common/base/trace.h"
 #include "common/base/version.h"
 #include "common/image/cryptomatte.h"
+#include "common/image/exr_threads.h"
 #include "common/image/frame_seal.h"
 #include "common/image/noise.h"
 #include "common/image/shadow.h"
@@ -169,12 +170,13 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
                                  FilmTile image, const std::optional<RgbImage>& plate,
                                  const std::function<Result<bool>(const Digest& made)>& may_replace,
-                                 const std::stop_token& stop, const Roots& roots) {
-  FrameQuality quality = judge_frame(image);
+                                 const std::stop_token& stop, const Roots& roots,
+                                 const Lend& lend) {
+  FrameQuality quality = judge_frame(image, lend);
   if (job.output.clamp_negative) clamp_negative(image);
   if (plate) {
     lay_over_plate(image, *plate);
-    quality = judge_composite(image, quality);
+    quality = judge_composite(image, quality, lend);
   }
   quality.clamped = job.output.clamp_negative;
   drop_channel(image, kErrorChannel);
@@ -189,7 +191,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
   const std::filesystem::path path = frame_path(job, frame);
   const FrameNumber number = job.frames.at(frame.index());
   const Camera camera(camera_at(job, number.value()), job.image.width, job.image.height);
-  std::optional<Span> encoding(std::in_place, SpanKind::write, "encoding");
+  std::optional<EncodingSpan> encoding(std::in_place, fmt::format("encoding frame {}", number));
   BATON_ASSIGN(Bytes bytes,
                encode_exr(path.string(), image,
                           {.half_float = job.output.pixel_type == PixelType::half_float,

@@ -43,7 +43,7 @@ Result<WrittenFrame> write_frame(
     const JobSpec& job, const Digest& job_digest, FrameIndex frame, FilmTile image,
     const std::optional<RgbImage>& plate = {},
     const std::function<Result<bool>(const Digest& made)>& may_replace = {},
-    const std::stop_token& stop = {}, const Roots& roots = {});
+    const std::stop_token& stop = {}, const Roots& roots = {}, const Lend& lend = lend_nobody);
 
 /// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
 /// `block` (0-based, modulo the number of blocks) its values. ErrorKind::corrupt names channel and

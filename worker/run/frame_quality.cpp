@@ -1,7 +1,9 @@
 #include "worker/run/frame_quality.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <span>
 
 #include "common/image/noise.h"
@@ -47,23 +49,29 @@ bool is_scatter(const FilmTile& image) {
 
 }  // namespace
 
-FrameQuality judge_frame(const FilmTile& image) {
+FrameQuality judge_frame(const FilmTile& image, const Lend& lend) {
   FrameQuality quality{.pixels = image.num_pixels()};
   const FilmColors colors(image);
   if (!colors) return quality;
-  judge_values(colors, quality);
-  quality.cycles_noise = cycles_noise(image);
-  if (const FrameNoise noise = noise_of_film(image); noise.is_told()) {
+  FrameNoise noise;
+  float cycles = 0, shown = 0;
+  const std::array<std::function<void()>, 4> looks{
+      [&] { judge_values(colors, quality); }, [&] { cycles = cycles_noise(image); },
+      [&] { noise = noise_of_film(image); }, [&] { shown = noise_as_shown(image); }};
+  share_parts(lend, "judging a frame", looks.size(), [&](std::size_t i) { looks[i](); });
+  quality.cycles_noise = cycles;
+  if (noise.is_told()) {
     quality.noise = noise.relative();
     quality.noise_error = noise.error_share();
-    quality.noise_shown = noise_as_shown(image);
+    quality.noise_shown = shown;
     quality.noise_source = is_scatter(image) ? NoiseSource::scatter : NoiseSource::probes;
   }
   return quality;
 }
 
-FrameQuality judge_composite(const FilmTile& image, const FrameQuality& rendered) {
-  FrameQuality quality = judge_frame(image);
+FrameQuality judge_composite(const FilmTile& image, const FrameQuality& rendered,
+                             const Lend& lend) {
+  FrameQuality quality = judge_frame(image, lend);
   quality.pixels_below_zero = rendered.pixels_below_zero;
   quality.lowest = rendered.lowest;
   quality.light_below_zero =

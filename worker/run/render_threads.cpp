@@ -42,6 +42,16 @@ void RenderThreads::submit(QueuedTask task) {
   changed_.notify_one();
 }
 
+bool RenderThreads::lend(std::function<void()> work) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closing_ || lent_.size() >= num_idle_) return false;
+    lent_.push_back(std::move(work));
+  }
+  changed_.notify_one();
+  return true;
+}
+
 void RenderThreads::stop(const LeaseId& lease) {
   const std::lock_guard lock(mutex_);
   for (Slot& slot : slots_) {
@@ -79,10 +89,20 @@ void RenderThreads::work() {
   while (true) {
     // Take the oldest task that nobody has begun.
     auto slot = slots_.end();
+    ++num_idle_;
     changed_.wait(lock, [&] {
       slot = std::find_if(slots_.begin(), slots_.end(), [](const Slot& s) { return !s.running; });
-      return closing_ || slot != slots_.end();
+      return closing_ || !lent_.empty() || slot != slots_.end();
     });
+    --num_idle_;
+    if (!lent_.empty()) {  // somebody waits for it
+      const std::function<void()> work = std::move(lent_.front());
+      lent_.pop_front();
+      lock.unlock();
+      work();
+      lock.lock();
+      continue;
+    }
     if (closing_) return;
     slot->running = true;
 

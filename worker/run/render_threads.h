@@ -1,6 +1,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <deque>
 #include <functional>
 #include <list>
 #include <memory>
@@ -42,6 +43,8 @@ class RenderThreads {
   RenderThreads& operator=(const RenderThreads&) = delete;
 
   void submit(QueuedTask task);
+  /// Lend: a render thread without a task does it, before any task.
+  bool lend(std::function<void()> work);
   /// Asks a queued or begun task to end soon; its result will be ErrorKind::cancelled unless it was
   /// about to end.
   void stop(const LeaseId& lease);
@@ -73,8 +76,11 @@ class RenderThreads {
   std::mutex mutex_;
   std::condition_variable changed_;       ///< for the render threads
   std::condition_variable executed_any_;  ///< for the publisher
-  std::list<Slot> slots_;                 ///< oldest first; queued and begun
-  Executed executed_;                     ///< not yet durable
+  std::size_t num_idle_ = 0;              ///< threads that wait for changed_
+  /// What idle threads have been lent to and have not begun: no more than there are of them.
+  std::deque<std::function<void()>> lent_;
+  std::list<Slot> slots_;  ///< oldest first; queued and begun
+  Executed executed_;      ///< not yet durable
   std::vector<LeaseId> left_thread_;
   std::vector<TaskEnded> ended_;
   bool closing_ = false;

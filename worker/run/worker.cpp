@@ -21,6 +21,7 @@
 #include "common/base/log.h"
 #include "common/base/patiently.h"
 #include "common/base/trace.h"
+#include "common/image/exr_threads.h"
 #include "common/job/plan/sequence.h"
 #include "common/job/plan/task_place.h"
 #include "common/job/text/job_json.h"
@@ -132,7 +133,7 @@ constexpr std::chrono::seconds kLoadPatience{limits::kMaxSecondsToLoad};
 /// should the process die, in the crash report.
 Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token& stop,
                                   std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch,
-                                  TaskSpan& span) {
+                                  TaskSpan& span, const Lend& lend) {
   // The time that a task may take does not include the loading of its job, which has its own.
   LoadedJobPtr loaded;
   {
@@ -162,7 +163,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
       notes.report(loaded->digest, {seen.error().message});
       return TaskResult{.made = {}, .unseen = seen.error().message};
     }
-    Result<TaskResult> frame = execute_task(*loaded, *task.store, task.grant, stop, &left);
+    Result<TaskResult> frame = execute_task(*loaded, *task.store, task.grant, stop, &left, lend);
     if (const Status seen = frame ? Status() : expect_output_folder(*loaded, stop); !seen)
       return TaskResult{.made = {}, .unseen = seen.error().message};
     if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
@@ -228,12 +229,14 @@ class Worker {
               return load_job_document(document, machine_, shelf_);
             },
             machine_.memory.states, kFilePatience, machine_.memory.scene_bytes / 2),
+        exr_threads_(lend_),
         threads_(
             options.num_threads,
             [this](const QueuedTask& task, const std::stop_token& stop,
                    std::vector<BlobRef>& left) {
               TaskSpan span(task.grant);
-              Result<TaskResult> result = execute_queued(task, stop, left, notes_, watch_, span);
+              Result<TaskResult> result =
+                  execute_queued(task, stop, left, notes_, watch_, span, lend_);
               span.end(result);
               return result;
             },
@@ -443,6 +446,8 @@ class Worker {
   NoteLog notes_;
   TaskWatch watch_;
   std::list<std::future<std::vector<StatesPublished>>> packing_;
+  const Lend lend_ = [this](auto work) { return threads_.lend(std::move(work)); };
+  const ExrThreads exr_threads_;
   /// Last: its threads use the rest and are joined first.
   RenderThreads threads_;
 };

@@ -11,6 +11,8 @@
 #include <limits>
 
 #include "common/base/files.h"
+#include "common/image/exr_threads.h"
+#include "tests/support/lent_threads.h"
 
 namespace baton {
 namespace {
@@ -297,6 +299,24 @@ Bytes with_claim(Bytes bytes, std::string_view key, std::uint32_t claim) {
   EXPECT_FALSE(found.empty());
   if (!found.empty()) std::memcpy(&*found.end(), &claim, sizeof(claim));
   return bytes;
+}
+
+TEST_F(ImageIoTest, TheBytesOfAnImageAreTheSameWhoeverCompressesIt) {
+  FilmTile image{{-3, 5, 120, 400}, {"R", "G", "B"}, {}};
+  image.values.resize(3 * image.num_pixels());
+  for (std::size_t i = 0; i < image.values.size(); ++i)
+    image.values[i] = std::sin(static_cast<float>(i % 977));
+  for (const char* const compression : {"none", "rle", "zips", "zip", "piz"}) {
+    SCOPED_TRACE(compression);
+    const Bytes alone = *encode_exr("a.exr", image, {.compression = compression});
+    LentThreads others;
+    {
+      const ExrThreads threads(others.lend());
+      EXPECT_EQ(*encode_exr("a.exr", image, {.compression = compression}), alone);
+    }
+    EXPECT_GT(others.join(), 10u);
+    EXPECT_EQ(*encode_exr("a.exr", image, {.compression = compression}), alone);
+  }
 }
 
 // OpenEXR would reserve gigabytes for a row.

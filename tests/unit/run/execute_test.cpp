@@ -8,6 +8,7 @@
 
 #include "common/base/limits.h"
 #include "common/store/folder_token.h"
+#include "tests/support/lent_threads.h"
 #include "tests/support/log_listener.h"
 #include "tests/unit/run/execute_fixture.h"
 #include "worker/run/frame_output.h"
@@ -43,6 +44,31 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
           << name << " of frame " << frame.value();
     }
   }
+}
+
+TEST_F(ExecuteTest, AnAssemblyIsTheSameWhoeverHelps) {
+  const auto films = render_all();
+  const auto& [step, inputs] = *films.rbegin();
+  ASSERT_GT(inputs.size(), 1u);
+  const FrameIndex frame = Timeline(job_).frame_of(step);
+  const TaskResult alone = execute(assemble_task(frame), inputs).value();
+  const Grant grant{.lease = {.job = loaded_->digest, .task = assemble_task(frame)},
+                    .inputs = inputs};
+  LentThreads others;
+  const auto assemble = [&] {
+    return execute_task(*loaded_, store_.value(), grant, {}, nullptr, others.lend());
+  };
+  const TaskResult shared = assemble().value();
+  EXPECT_GT(others.join(), 1u);
+  EXPECT_EQ(shared.made.outputs, alone.made.outputs);
+  ASSERT_EQ(shared.made.frames.size(), 1u);
+  EXPECT_EQ(shared.made.frames[0].quality.noise, alone.made.frames[0].quality.noise);
+  EXPECT_EQ(shared.made.frames[0].quality.mean, alone.made.frames[0].quality.mean);
+  // What one of them does not find is an error of the whole.
+  ASSERT_TRUE(store_.value().remove(inputs.back().digest));
+  const Result<TaskResult> without = assemble();
+  ASSERT_FALSE(without);
+  EXPECT_THAT(without.error().message, testing::HasSubstr(inputs.back().digest.hex().substr(2)));
 }
 
 TEST_F(ExecuteTest, TheNumberOfThreadsDoesNotShow) {

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
+#include <memory>
 #include <semaphore>
+#include <thread>
 
 #include "tests/support/patience.h"
 
@@ -51,6 +54,40 @@ TEST(RenderThreads, RunsEverythingOnceAndWakesForEachResult) {
   for (int tile = 0; tile < 50; ++tile) {
     EXPECT_EQ(ended[tile].lease, lease(tile));
     EXPECT_EQ(ended[tile].result->made.stats.pixels, std::uint64_t(tile));
+  }
+}
+
+// A thread without a task helps one that shares what it does; where all have tasks none is lent.
+TEST(RenderThreads, ThreadsWithoutATaskAreLent) {
+  for (const int num_threads : {1, 3}) {
+    SCOPED_TRACE(num_threads);
+    constexpr std::size_t kParts = 64;
+    std::vector<std::atomic<int>> done(kParts);
+    std::atomic<std::size_t> num_helped = 0;
+    std::counting_semaphore<> woken(0), helped(0);
+    std::unique_ptr<RenderThreads> pool;
+    const auto share = [&](const QueuedTask&, const std::stop_token&, std::vector<BlobRef>&) {
+      const std::thread::id own = std::this_thread::get_id();
+      // The other threads wait for a task by then.
+      bool has_idle = num_threads == 1;
+      while (!has_idle) has_idle = pool->lend([] {});
+      share_parts([&](auto work) { return pool->lend(std::move(work)); }, "it", kParts,
+                  [&](std::size_t part) {
+                    ++done[part];
+                    if (std::this_thread::get_id() != own) {
+                      ++num_helped;
+                      helped.release();
+                    } else if (num_threads > 1 && num_helped == 0) {
+                      static_cast<void>(helped.try_acquire_for(with_patience(10s)));
+                    }
+                  });
+      return TaskResult{};
+    };
+    pool = std::make_unique<RenderThreads>(num_threads, share, at_once, [&] { woken.release(); });
+    pool->submit(task(0));
+    collect(*pool, woken, 1);
+    for (const std::atomic<int>& times : done) EXPECT_EQ(times, 1);
+    EXPECT_EQ(num_helped > 0, num_threads > 1);
   }
 }
 

@@ -56,6 +56,13 @@ struct FramesTest : ServiceTest {
     sync(worker);
     return id;
   }
+  /// From now on what FakeWorker writes is a picture, of nobody that is known.
+  void take_images_for_pictures() {
+    options.disk.picture_writer = [](const std::string&, const Bytes& bytes) {
+      const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+      return text.starts_with("image of") ? std::optional(text) : std::nullopt;
+    };
+  }
   /// Submits the job as it was before: of another priority. Its digest.
   Digest submit_former(const std::string& endpoint) {
     JobSpec former = job;

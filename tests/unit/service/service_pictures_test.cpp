@@ -84,10 +84,7 @@ TEST_F(FramesTest, LocksAreAdvisedForFramesThatTheJobHas) {
 
 // Another job has taken a frame of this folder with --restart; its former owner's is put back.
 TEST_F(FramesTest, AFormerJobsPictureThatIsPutBackIsKept) {
-  options.disk.picture_writer = [](const std::string&, const Bytes& bytes) {
-    const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    return text.starts_with("image of") ? std::optional(text) : std::nullopt;
-  };
+  take_images_for_pictures();
   const RunningService service(options);
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
@@ -139,6 +136,32 @@ TEST_F(FramesTest, AFormerVersionsPictureIsKeptThoughTheNewerOneIsGone) {
   put(2, of_former);
   wait_for_frame_2(next);
   EXPECT_THAT(granted, testing::Not(testing::Contains(digest_of(of_former))));
+}
+
+// The newest version has rendered nothing itself, and a former one's frame is to be rendered once
+// more, of which nothing came: another version had taken its place.
+TEST_F(FramesTest, AKeptFrameIsAsNewAsWhenItWasRendered) {
+  take_images_for_pictures();
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  const Digest first = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  EXPECT_EQ(finish(service.endpoint(), worker, first).summary.status, JobStatus::done);
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document, false, true, {FrameNumber(2)}});
+  fs::remove(frame(2));
+  JobSpec next = job;
+  const auto submit = [&] {
+    return ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(next).value()}).version;
+  };
+  next.output.pixel_type = PixelType::full_float;
+  const Digest second = submit();
+  FakeWorker writer(service.endpoint(), store(), next, "writer");
+  writer.hello();
+  EXPECT_EQ(finish(service.endpoint(), writer, second).summary.status, JobStatus::done);
+  for (const int tile_size : {16, 32}) {
+    next.image.tile_size = tile_size;
+    EXPECT_EQ(show(service.endpoint(), submit()).summary.status, JobStatus::done) << "all is kept";
+  }
 }
 
 // The former one once more, which replaces the newer one's.

@@ -97,6 +97,28 @@ TEST_F(TraceTest, WhatIsMadeOnceIsWaitedForOrShared) {
   EXPECT_NEAR(play(shared, 4).seconds, 0.4 + 0.4 + 1, 1e-6);
 }
 
+// Parts of an assembly go to threads that have nothing to do, whoever did them when it was
+// recorded, and before any task.
+TEST_F(TraceTest, WhatIsSharedIsDoneWithIdleThreads) {
+  add_tile(1, 0, 0, 0, 1);
+  add(1, "task", "frame", 1, 5, R"("job":"v","id":"j","kind":"assemble","position":0,"step":0)");
+  add(1, "share", "tiles of step 0", 2, 3);
+  for (int part = 0; part < 3; ++part) add(1, "help", "tiles of step 0", 2 + part, 1);
+  add(2, "help", "tiles of step 0", 2, 1);
+  add(2, "help", "tiles of step 1", 3, 1);  // of somebody else
+  Trace trace = read();
+  const PlayedTrace apart = take_apart(trace);
+  EXPECT_NEAR(apart.work_s(), 1 + 5 + 1, 1e-6);
+  EXPECT_NEAR(play(apart, 1).seconds, 7, 1e-6);
+  EXPECT_NEAR(play(apart, 2).seconds, 1 + 2 + 2, 1e-6);
+  EXPECT_NEAR(play(apart, 3).seconds, 1 + 2 + 2, 1e-6) << "four parts";
+  EXPECT_NEAR(play(apart, 4).seconds, 1 + 2 + 1, 1e-6);
+  add_tile(2, 1, 0, 0, 1);
+  const TraceSummary summary = summarize(read(), {});
+  EXPECT_EQ(summary.threads, 2u);
+  EXPECT_NEAR(summary.busy * summary.seconds, 1 + 5 + 1 + 2, 1e-6);
+}
+
 // Of a task that was done again the last attempt counts, and none that came to nothing.
 TEST_F(TraceTest, WhatWasLostIsLeftOut) {
   add_tile(1, 0, 0, 0, 5);
