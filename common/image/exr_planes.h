@@ -11,7 +11,7 @@ namespace baton {
 inline constexpr int kOpenExrThreads = 0;
 /// For how many threads OpenEXR keeps blocks of lines in hand when it writes: two for each, of some
 /// megabytes.
-inline constexpr int kOpenExrWriters = 4;
+inline constexpr int kOpenExrWriters = 2;
 
 /// The address that pixel (0, 0) would have, which OpenEXR wants, where `rect` is stored from
 /// `base`.

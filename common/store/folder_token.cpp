@@ -68,12 +68,15 @@ Result<std::string> read_after_token(const std::filesystem::path& file, const st
              : read.error();
     if (patience != nullptr && patience->wait_after(waits_for)) continue;
     if (!read) return read.error();
+    std::error_code error;
     return Error{
         ErrorKind::io,
         fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "
                     "say where it is with --map",
                     file.parent_path().string(), file.filename().string(),
-                    found ? "has another token" : "no such file")};
+                    found                                  ? "has another token"
+                    : std::filesystem::exists(file, error) ? "is no file"
+                                                           : "no such file")};
   }
 }
 

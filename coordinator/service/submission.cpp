@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -263,8 +264,7 @@ SharedDocument Submission::newest_document(const JobId& job) {
   return newest && (*newest)->parsed ? *newest : nullptr;
 }
 
-/// What the document makes another of a job that is known; empty: nothing of its place in the queue
-/// and of its frames.
+/// What the document makes another of a job that is known; empty: nothing.
 std::string Submission::changes_text(const ParsedJobDocument& document, const JobId& job,
                                      bool keep_priority) {
   const SharedDocument newest = newest_document(job);
@@ -279,6 +279,9 @@ std::string Submission::changes_text(const ParsedJobDocument& document, const Jo
   compare("frames", format_frames(document.job.frames), format_frames(before.frames));
   compare("priority", keep_priority ? known.priority(job, written) : written,
           known.priority(job, before.priority));
+  std::vector<std::string> others = picture_differences(*newest->parsed, document);
+  std::ranges::move(setting_differences(before, document.job), std::back_inserter(others));
+  if (!others.empty()) changes.push_back("changed: " + differing_text(others));
   return fmt::format("{}", fmt::join(changes, "; "));
 }
 

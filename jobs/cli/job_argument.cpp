@@ -67,15 +67,17 @@ std::vector<JobOverride> overrides_of(const JobArgument& argument) {
   return overrides;
 }
 
-std::string command_text(const JobArgument& argument) {
-  std::string text = quoted(argument.file);
-  const auto add = [&](const char* option, const std::string& value) {
-    if (!value.empty()) text += fmt::format(" {} {}", option, quoted(value));
-  };
-  add("--frames", argument.frames);
-  add("--scale", argument.scale);
-  add("--region", argument.region);
-  for (const std::string& setting : argument.set) add("--set", setting);
+std::string typed_again(const CLI::App& command, const std::set<std::string>& without) {
+  std::string text;
+  std::set<const CLI::Option*> said;
+  for (const CLI::Option* const option : command.parse_order()) {
+    const std::string name = option->get_positional() ? "" : option->get_name();
+    if (without.contains(name) || !said.insert(option).second) continue;
+    for (const std::string& value : option->results()) {
+      if (!name.empty()) text += (text.empty() ? "" : " ") + name;
+      if (option->get_items_expected_max() > 0) text += (text.empty() ? "" : " ") + quoted(value);
+    }
+  }
   return text;
 }
 

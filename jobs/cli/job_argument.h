@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,8 @@ void add_override_options(CLI::App& command, JobArgument& argument);
 
 /// What the options put into the JSON of the job, --set last.
 std::vector<JobOverride> overrides_of(const JobArgument& argument);
-/// The argument as it is typed, for a shell.
-std::string command_text(const JobArgument& argument);
+/// The arguments of a command as they were typed, for a shell, without some of its options.
+std::string typed_again(const CLI::App& command, const std::set<std::string>& without);
 
 /// The job with the changes of a command line; motion is not settled. One that is not what its file
 /// says is a look (OutputSpec::is_look), and its frames go to a folder of their own (`-look` behind

@@ -11,10 +11,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <string_view>
 #include <thread>
 
+#include "common/base/exit_codes.h"
 #include "common/base/files.h"
+#include "common/base/legible.h"
 #include "common/base/limits.h"
 #include "common/base/machine_memory.h"
 #include "common/base/patience.h"
@@ -31,6 +34,17 @@ constexpr milliseconds kCoordinatorPatience{5000 * kPatienceFactor};
 /// In a row, of a program that each time lived for less than kShortLife.
 constexpr int kMaxRestarts = 5;
 constexpr std::chrono::seconds kShortLife{60};
+
+/// Why a program has ended, by its log; empty: that says nothing.
+std::string last_line_of(const fs::path& log) {
+  std::ifstream stream(log);
+  std::string last;
+  for (std::string line; std::getline(stream, line);) {
+    if (!line.empty()) last = line;
+  }
+  const std::size_t error = last.find("error: ");
+  return legible_line(error == last.npos ? last : last.substr(error));
+}
 
 /// The share of one worker; there is one.
 std::uint64_t memory_mib_of_each(const FarmOptions& options) {
@@ -162,6 +176,10 @@ Status LocalFarm::tend() {
     const std::optional<std::string> end = member.process.ended();
     if (!end) continue;
     const std::string log = log_of(member.name).string();
+    // Another try finds the same command line.
+    if (*end == fmt::format("exit code {}", static_cast<int>(ExitCode::usage)))
+      return Error{ErrorKind::usage,
+                   fmt::format("{} ended ({}): {}", member.name, *end, last_line_of(log))};
     const auto now = std::chrono::steady_clock::now();
     if (now - std::exchange(member.started, now) > kShortLife) member.restarts = 0;
     if (member.restarts == kMaxRestarts) {

@@ -166,6 +166,8 @@ def a_file_that_is_submitted_says_the_priority(programs, folder):
         check_equal(submit(farm, folder, "shot", frames="1-3", priority=20), shot, "the job")
         check_equal(farm.show(shot)["priority"], 20, "the priority of a longer job")
         check_says(events(farm, shot)[-1], "job changed", "frames 1-3, it was 1-2; priority 20, it was 91")
+        submit(farm, folder, "shot", frames="1-3", priority=20, metadata={"a": "b"}, image={"tileSize": 16})
+        check(events(farm, shot)[-1].endswith("changed: $.image.tileSize, $.metadata.a"), events(farm, shot)[-1])
         log = farm.coordinator.log()
         check("frames of another job" not in log, log)
         check_says(log, "version 2 goes on in place of version 1")

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -267,12 +268,14 @@ def files_that_are_no_states(programs, folder):
     desk.expect(BAD_INPUT, "state", "verify", "empty.bst", "text.bst", says=["empty.bst", "text.bst"])
 
 
-def replace_programs(desk, coordinator):
-    """baton gets, beside it, scripts in place of the other programs."""
+def replace_programs(desk, coordinator, worker="sleep 60"):
+    """baton gets, beside it, scripts in place of the other programs; coordinator: None: the true one."""
+    if coordinator is None:
+        coordinator = f'exec {shlex.quote(str(Path(desk.program).parent / "baton-coordinator"))} "$@"'
     (desk.folder / "bin").mkdir()
     shutil.copy(desk.program, desk.folder / "bin/baton")
     desk.program = desk.folder / "bin/baton"
-    for name, text in {"baton-coordinator": coordinator, "baton-worker": "sleep 60"}.items():
+    for name, text in {"baton-coordinator": coordinator, "baton-worker": worker}.items():
         (desk.folder / "bin" / name).write_text("#!/bin/sh\n" + text + "\n")
         (desk.folder / "bin" / name).chmod(0o755)
 
@@ -283,6 +286,13 @@ def render_names_the_log_of_a_coordinator_that_fails(programs, folder):
     log = folder / "cube-frames/.baton/coordinator.log"
     desk.expect(IO, "render", desk.job(), says=["the coordinator did not start (exit code 3)", str(log)])
     check_says(log.read_text(), "the disk is on fire")
+
+
+def render_does_not_repeat_what_a_worker_cannot_be_told(programs, folder):
+    """Such as an instruction set that this machine does not have."""
+    desk = Desk(programs, folder)
+    replace_programs(desk, None, "echo 2026-11-30T12:00:00 baton-worker error: --isa: none; exit 64")
+    desk.expect(USAGE, "render", desk.job(), says="worker-1 ended (exit code 64): error: --isa: none")
 
 
 def children_die_with_a_killed_parent(programs, folder):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """`baton render` that is killed in the middle goes on where it was when it is started again."""
 
+import shlex
 import json
 import re
 from pathlib import Path
@@ -124,13 +125,16 @@ def an_edited_job_does_not_mix_with_the_one_before(programs, folder):
 def an_interrupted_render_goes_on_under_another_name(programs, folder):
     """Nobody else waits for it in a farm of its own, whatever its name, frames and files are now."""
     job = make_job(folder, frames="1-12")
-    words = [programs.path("baton"), "render", write_job(folder / "job.json", job), "--work-dir", folder / "work", "--threads-per-worker", "1"]
+    words = [programs.path("baton"), "render", "--isa", "sse4", "--restart", write_job(folder / "job.json", job), "--set", "seed=7",
+             "--work-dir", folder / "work dir", "--threads-per-worker", "1"]
     first = Process([str(word) for word in words], folder / "first.log")
     wait_until(lambda: (folder / "frames/frame.0002.exr").exists(), "two frames are done")
     first.terminate()
     check(first.wait() != OK, "it was done too soon")
+    again = [str(word) for word in words[2:] if word != "--restart"]
+    check(f"to go on: baton render {shlex.join(again)}\n" in first.log(), first.log())
     renamed = write_job(folder / "z.json", {**job, "name": "z", "frames": "1-3", "output": {**job["output"], "pattern": "s.####.exr"}})
-    done = programs.render(renamed, folder / "work")
+    done = programs.render(renamed, folder / "work dir", extra=["--isa", "sse4"])
     check("which was interrupted, makes way" in done.stderr, done.stderr)
     check_equal(sorted(file.name for file in (folder / "frames").glob("s.*.exr")), [f"s.000{n}.exr" for n in (1, 2, 3)], "frames")
 

@@ -189,6 +189,28 @@ std::vector<std::string> picture_differences(const ParsedJobDocument& a,
   return {differences.begin(), differences.end()};
 }
 
+std::vector<std::string> setting_differences(const JobSpec& a, const JobSpec& b) {
+  const auto settings_of = [](JobSpec job) {
+    job.scene.objects.clear();
+    nlohmann::json settings = nlohmann::json::parse(to_json(with_few_keys(std::move(job))));
+    for (const char* const known : {"name", "frames", "priority"}) settings.erase(known);
+    return settings.flatten();
+  };
+  const nlohmann::json left = settings_of(a), right = settings_of(b);
+  std::set<std::string> differences;
+  for (const auto& [one, other] : {std::pair(&left, &right), std::pair(&right, &left)}) {
+    for (const auto& [path, value] : one->items()) {
+      const auto found = other->find(path);
+      const bool is_same = found != other->end() && *found == value;
+      const bool is_empty = value.is_null();  // a list or object: the other one says what it has
+      if (!is_setting(path) || is_same || is_empty) continue;
+      const std::string name = json_path(path);
+      differences.insert(name.substr(0, name.find('[')));  // lists as a whole
+    }
+  }
+  return {differences.begin(), differences.end()};
+}
+
 FrameComparison::Frames::Frames(const ParsedJobDocument& document)
     : document_(&document), contents_(contents_of(document)), facts_(document.job.frames.size()) {
   for (const ObjectSpec& object : document.job.scene.objects) {

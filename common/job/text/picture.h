@@ -24,6 +24,8 @@ Digest picture_digest(const JobSpec& job, const std::vector<AssetDigest>& assets
 /// sorted. Empty exactly when the picture digests are equal.
 std::vector<std::string> picture_differences(const ParsedJobDocument& a,
                                              const ParsedJobDocument& b);
+/// The settings that differ, but for names, frames and the priority: JSON paths, sorted.
+std::vector<std::string> setting_differences(const JobSpec& a, const JobSpec& b);
 
 /// What two jobs show in their frames, for jobs of one picture digest: the number of a frame, its
 /// light with the contents of its maps, the camera and the poses of all that moves; where both show

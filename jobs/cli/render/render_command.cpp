@@ -65,7 +65,8 @@ class FarmTrace {
   std::filesystem::path logs_;
 };
 
-Result<ExitCode> run_render(const RenderOptions& options) {
+/// again: the arguments that go on with it.
+Result<ExitCode> run_render(const RenderOptions& options, const std::string& again) {
   FarmTrace trace(options.trace);
   BATON_ASSIGN(JobSpec job, load_settled(options.job));
   BATON_TRY(begin_at(job, options.from_frame));
@@ -94,9 +95,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   BATON_TRY(trace.write());
   if (status) return exit_code_of(job, *status, options.memory_mib);
 
-  std::string place = options.work_directory.empty() ? "" : " --work-dir " + options.work_directory;
-  if (options.from_frame) place += fmt::format(" --from-frame {}", *options.from_frame);
-  tell("to go on: baton render {}{}\n", command_text(options.job), place);
+  tell("to go on: baton render {}\n", again);
   return ExitCode::cancelled;
 }
 
@@ -148,9 +147,10 @@ void add_render_command(CLI::App& app, ExitCode& code) {
       "With --frames, --scale, --region or --set, frames go to a folder of their own, that of the\n"
       "job with -look behind its name.\n"
       "Ctrl-C stops; the same command goes on where it stopped.");
-  command->callback([options, &code] {
-    code =
-        finish_with_coordinator(options->watch ? watch_and_render(*options) : run_render(*options));
+  command->callback([options, command, &code] {
+    code = finish_with_coordinator(
+        options->watch ? watch_and_render(*options)
+                       : run_render(*options, typed_again(*command, {"--restart"})));
   });
 }
 
