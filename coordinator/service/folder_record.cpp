@@ -70,15 +70,12 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
     BATON_ASSIGN(writer.renderers, journal.renderers(other));
     BATON_ASSIGN(const auto granted, journal.frame_files(other));
     std::map<fs::path, std::int64_t> rendered;
-    std::set<FrameIndex> may_be_there;
+    std::set<FrameIndex> may_be_there;  // and was not reported
     for (const auto& [frame, file] : granted) {
       if (frame.index() >= spec.frames.size()) continue;
       if (!file.is_gone) may_be_there.insert(frame);
       if (file.rendered != 0) rendered[path_of(frame)] = file.rendered;
     }
-    const bool is_of_job = std::ranges::find(record.family_, other) != record.family_.end();
-    if (!is_of_job) may_be_there = made_again(*written->parsed, may_be_there, document);
-    for (const FrameIndex frame : may_be_there) writer.granted.insert(path_of(frame));
     // What another job had when it ended, less what it has lost since.
     std::optional<std::set<FrameNumber>> has;
     if (jobs.of(other).id != id) {
@@ -89,6 +86,7 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
       if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
       const FrameIndex frame = done.task.frame();
       if (frame.index() >= spec.frames.size()) return {};
+      if (!done.made.outputs.front().is_placeholder()) may_be_there.erase(frame);
       const bool is_given_away = has && !has->contains(spec.frames[frame.index()]);
       const fs::path path = path_of(frame);
       const auto last = rendered.extract(path);
@@ -98,6 +96,9 @@ Result<FolderRecord> FolderRecord::read(Journal& journal, const IdentityBook& jo
                                       .rendered = last ? last.mapped() : 0});
       return {};
     }));
+    const bool is_of_job = std::ranges::find(record.family_, other) != record.family_.end();
+    if (!is_of_job) may_be_there = made_again(*written->parsed, may_be_there, document);
+    for (const FrameIndex frame : may_be_there) writer.granted.insert(path_of(frame));
     for (const auto& [path, last] : rendered)
       record.images_[path].push_back(
           {.job = other, .image = {}, .rendered = last, .is_lost = true});

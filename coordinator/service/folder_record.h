@@ -79,7 +79,8 @@ class FolderRecord {
   std::optional<std::map<std::string, std::string>> locked_;
   struct Writer {
     std::set<std::string> renderers;  ///< Journal::renderers
-    /// Frames that its workers may have written; of another job those of the same picture.
+    /// Frames that its workers may have written and not reported; of another job those of the same
+    /// picture.
     std::set<std::filesystem::path> granted;
   };
   std::map<Digest, Writer> jobs_;

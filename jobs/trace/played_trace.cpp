@@ -297,6 +297,9 @@ class Player {
       return std::pair(time_s, order) > std::pair(other.time_s, other.order);
     }
   };
+  struct BusyStretch {
+    double from_s, to_s, threads;
+  };
   struct Task {
     std::size_t missing = 0;
     std::vector<std::size_t> followers;
@@ -351,6 +354,7 @@ class Player {
       return begin_part(number, /*is_helper=*/false);
     }
     task.busy_s += piece.seconds;
+    stretches_.push_back({now_s_, now_s_ + piece.seconds, 1});
     add(now_s_ + piece.seconds, EventKind::piece_done, number);
   }
   void begin_part(std::size_t number, bool is_helper) {
@@ -359,6 +363,7 @@ class Player {
     if (--task.parts_left == 0) sharing_.erase(number);
     ++task.parts_begun;
     if (!is_helper) task.busy_s += part_s;
+    stretches_.push_back({now_s_, now_s_ + part_s, 1});
     add(now_s_ + part_s, EventKind::part_done, number, is_helper ? 1 : 0);
   }
   void end_part(std::size_t number, bool is_helper) {
@@ -382,17 +387,20 @@ class Player {
     add(now_s_ + left_s, EventKind::work_done, number, ++work.version);
   }
   /// One works alone first, then all do.
-  void advance(Work& work) const {
-    double passed_s = now_s_ - std::exchange(work.since_s, now_s_);
+  void advance(Work& work) {
+    const double since_s = std::exchange(work.since_s, now_s_);
     if (work.tasks.empty()) return;
-    const double alone_s = std::min(passed_s, work.alone_s);
+    const double alone_s = std::min(now_s_ - since_s, work.alone_s);
+    const double shared_since_s = since_s + alone_s, passed_s = now_s_ - shared_since_s;
+    const auto count = static_cast<double>(work.tasks.size());
+    stretches_.push_back({since_s, shared_since_s, 1});
+    stretches_.push_back({shared_since_s, now_s_, count});
     work.alone_s -= alone_s;
-    passed_s -= alone_s;
-    work.shared_s =
-        std::max(work.shared_s - passed_s * static_cast<double>(work.tasks.size()), 0.0);
+    work.shared_s = std::max(work.shared_s - passed_s * count, 0.0);
   }
   void end_work(std::size_t number) {
     Work& work = works_[number];
+    advance(work);
     work.is_made = true;
     for (const std::size_t at : std::exchange(work.tasks, {})) {
       tasks_[at].waits_s[without_number(trace_.works[number].name)] +=
@@ -419,6 +427,9 @@ class Player {
     Playback playback;
     playback.seconds = trace_.lead_s + end_s_ + trace_.tail_s;
     if (playback.seconds > 0) playback.busy = trace_.work_s() / playback.seconds;
+    for (const BusyStretch& stretch : stretches_)
+      playback.busy_over_time.add(playback.seconds, trace_.lead_s + stretch.from_s,
+                                  trace_.lead_s + stretch.to_s, stretch.threads);
     if (tasks_.empty()) return playback;
     for (std::optional<std::size_t> at = last_; at; at = tasks_[*at].cause) {
       playback.chain_s[trace_.tasks[*at].kind] += tasks_[*at].busy_s;
@@ -435,6 +446,7 @@ class Player {
   std::size_t last_ = 0, next_order_ = 0;
   std::vector<Task> tasks_;
   std::vector<Work> works_;
+  std::vector<BusyStretch> stretches_;
   std::set<std::size_t> sharing_;  ///< tasks with parts that nobody has begun
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   std::priority_queue<std::size_t, std::vector<std::size_t>, std::greater<>> ready_;
@@ -450,6 +462,19 @@ double PlayedTrace::work_s() const {
   }
   for (const SharedWork& work : works) sum_s += work.alone_s + work.shared_s;
   return sum_s;
+}
+
+void BusyOverTime::add(double whole_s, double from_s, double to_s, double count) {
+  const double slice_s = whole_s / static_cast<double>(kSlices);
+  if (slice_s <= 0) return;
+  const auto slice_of = [&](double time_s) {
+    return std::min(static_cast<std::size_t>(std::max(time_s, 0.0) / slice_s), kSlices - 1);
+  };
+  for (std::size_t i = slice_of(from_s); i <= slice_of(to_s); ++i) {
+    const double begin_s = slice_s * static_cast<double>(i), end_s = begin_s + slice_s;
+    const double covered_s = std::min(to_s, end_s) - std::max(from_s, begin_s);
+    if (covered_s > 0) threads[i] += count * covered_s / slice_s;
+  }
 }
 
 PlayedTrace take_apart(const Trace& trace) { return Dissection(trace).take(); }

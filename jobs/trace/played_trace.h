@@ -51,10 +51,20 @@ struct PlayedTrace {
 /// counts. Works of the frames that several processes have made count once, with their mean.
 PlayedTrace take_apart(const Trace& trace);
 
+/// Busy threads in equal stretches of time, their means.
+struct BusyOverTime {
+  static constexpr std::size_t kSlices = 60;
+  std::vector<double> threads = std::vector<double>(kSlices, 0.0);
+
+  /// So many more are busy for a time. whole_s: how long all of it takes.
+  void add(double whole_s, double from_s, double to_s, double count = 1);
+};
+
 /// How it goes on so many threads of one process.
 struct Playback {
   double seconds = 0;  ///< lead and tail included
   double busy = 0;     ///< threads, the mean
+  BusyOverTime busy_over_time = {};
   /// The chain of tasks that ends last: busy seconds by kind, and those in which it waited for
   /// works, by what these are, without their numbers.
   std::map<std::string, double> chain_s, chain_waits_s;

@@ -19,17 +19,6 @@ std::vector<std::pair<std::string, double>> ordered(const Sums& sums) {
   return result;
 }
 
-/// Adds the stretch to the slices that it covers.
-void add_stretch(std::vector<double>& slices, double slice_s, double from_s, double to_s,
-                 double sign) {
-  if (slice_s <= 0) return;
-  for (std::size_t i = 0; i < slices.size(); ++i) {
-    const double begin_s = slice_s * static_cast<double>(i), end_s = begin_s + slice_s;
-    const double covered_s = std::min(to_s, end_s) - std::max(from_s, begin_s);
-    if (covered_s > 0) slices[i] += sign * covered_s / slice_s;
-  }
-}
-
 std::string text_of(const std::vector<std::pair<std::string, double>>& sums) {
   std::string text;
   constexpr std::size_t kMost = 8;
@@ -49,8 +38,6 @@ nlohmann::ordered_json json_of(const std::vector<std::pair<std::string, double>>
 TraceSummary summarize(const Trace& trace, const std::vector<std::size_t>& threads) {
   TraceSummary summary;
   summary.seconds = trace.end_s() - trace.begin_s();
-  summary.busy_over_time.assign(TraceSummary::kSlices, 0);
-  const double slice_s = summary.seconds / static_cast<double>(TraceSummary::kSlices);
   std::set<Thread> seen;
   std::set<std::int32_t> workers;
   Sums done, waited;
@@ -71,14 +58,14 @@ TraceSummary summarize(const Trace& trace, const std::vector<std::size_t>& threa
       busy_s += span.seconds;
       const std::string kind = span.task.kind.empty() ? without_number(span.name) : span.task.kind;
       done[kind] += span.seconds;
-      add_stretch(summary.busy_over_time, slice_s, from_s, to_s, 1);
+      summary.busy_over_time.add(summary.seconds, from_s, to_s);
       continue;
     }
     if (span.kind == SpanKind::help && span.start_s >= now.task_end_s) {
       seen.insert(thread);
       done["helping with " + without_number(span.name)] += span.seconds;
       busy_s += span.seconds;
-      add_stretch(summary.busy_over_time, slice_s, from_s, to_s, 1);
+      summary.busy_over_time.add(summary.seconds, from_s, to_s);
       continue;
     }
     // Works and waits that lie in no other; who helps meanwhile does not wait.
@@ -86,7 +73,7 @@ TraceSummary summarize(const Trace& trace, const std::vector<std::size_t>& threa
       waited[now.waits_for] -= span.seconds;
       done["helping with " + without_number(span.name)] += span.seconds;
       busy_s += span.seconds;
-      add_stretch(summary.busy_over_time, slice_s, from_s, to_s, 1);
+      summary.busy_over_time.add(summary.seconds, from_s, to_s);
       continue;
     }
     const bool counts = span.kind == SpanKind::make || span.kind == SpanKind::wait;
@@ -98,7 +85,7 @@ TraceSummary summarize(const Trace& trace, const std::vector<std::size_t>& threa
     } else {
       waited[without_number(span.name)] += span.seconds;
       busy_s -= span.seconds;
-      add_stretch(summary.busy_over_time, slice_s, from_s, to_s, -1);
+      summary.busy_over_time.add(summary.seconds, from_s, to_s, -1);
     }
   }
   summary.threads = seen.size();
@@ -126,7 +113,10 @@ std::string summary_text(const TraceSummary& summary) {
       "busy       ",
       summary.seconds, summary.threads, summary.workers, summary.busy, summary.lead_s,
       summary.tail_s);
-  for (const double busy : summary.busy_over_time) text += fmt::format("{:.0f} ", busy);
+  const auto add_busy = [&](const BusyOverTime& busy) {
+    for (const double threads : busy.threads) text += fmt::format("{:.0f} ", threads);
+  };
+  add_busy(summary.busy_over_time);
   text += fmt::format("\nthreads did      s: {}\nthey waited for  s: {}\n", text_of(summary.done),
                       text_of(summary.waited));
   const Playback& chain = summary.without_limit;
@@ -140,6 +130,9 @@ std::string summary_text(const TraceSummary& summary) {
     text +=
         fmt::format("played     {:3} threads: {:.2f} s, {:.1f} busy ({:.0f} %)\n", threads,
                     played.seconds, played.busy, 100 * played.busy / static_cast<double>(threads));
+    text += "           ";
+    add_busy(played.busy_over_time);
+    text += '\n';
   }
   return text;
 }
@@ -151,7 +144,7 @@ nlohmann::ordered_json summary_json(const TraceSummary& summary) {
                               {"busy", summary.busy},
                               {"leadSeconds", summary.lead_s},
                               {"tailSeconds", summary.tail_s},
-                              {"busyOverTime", summary.busy_over_time},
+                              {"busyOverTime", summary.busy_over_time.threads},
                               {"doneSeconds", json_of(summary.done)},
                               {"waitedSeconds", json_of(summary.waited)}};
   const Playback& chain = summary.without_limit;
@@ -161,8 +154,10 @@ nlohmann::ordered_json summary_json(const TraceSummary& summary) {
                           {"waitedSeconds", chain.chain_waits_s}};
   told["played"] = nlohmann::ordered_json::array();
   for (const auto& [threads, played] : summary.played)
-    told["played"].push_back(
-        {{"threads", threads}, {"seconds", played.seconds}, {"busy", played.busy}});
+    told["played"].push_back({{"threads", threads},
+                              {"seconds", played.seconds},
+                              {"busy", played.busy},
+                              {"busyOverTime", played.busy_over_time.threads}});
   return told;
 }
 

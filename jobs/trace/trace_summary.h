@@ -20,15 +20,12 @@ struct TraceSummary {
   /// Threads with a task that did not wait, the mean.
   double busy = 0;
   double lead_s = 0, tail_s = 0;  ///< before the first task and after the last
-  /// (kSlices), threads, the means of equal stretches.
-  std::vector<double> busy_over_time;
+  BusyOverTime busy_over_time = {};
   /// Thread seconds by what was done or waited for, the greatest first.
   std::vector<std::pair<std::string, double>> done, waited;
   /// On so many threads of one worker, by list scheduling.
   std::vector<std::pair<std::size_t, Playback>> played;
   Playback without_limit;  ///< with a thread for each task
-
-  static constexpr std::size_t kSlices = 60;
 };
 
 /// threads: which numbers of threads to play it on.

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <numeric>
 #include <thread>
 
 #include "jobs/trace/played_trace.h"
@@ -94,7 +95,13 @@ TEST_F(TraceTest, WhatIsMadeOnceIsWaitedForOrShared) {
   EXPECT_NEAR(shared.works[0].alone_s, 0.4, 1e-6);
   EXPECT_NEAR(shared.works[0].shared_s, 1.6, 1e-6);
   EXPECT_NEAR(play(shared, 1).seconds, 6, 1e-6);
-  EXPECT_NEAR(play(shared, 4).seconds, 0.4 + 0.4 + 1, 1e-6);
+  const Playback on_four = play(shared, 4);
+  EXPECT_NEAR(on_four.seconds, 0.4 + 0.4 + 1, 1e-6);
+  const std::vector<double>& busy = on_four.busy_over_time.threads;
+  EXPECT_NEAR(std::accumulate(busy.begin(), busy.end(), 0.0) / BusyOverTime::kSlices, on_four.busy,
+              1e-6);
+  EXPECT_NEAR(busy.front(), 1, 1e-6) << "one makes what cannot be shared";
+  EXPECT_NEAR(busy.back(), 4, 1e-6);
 }
 
 // Parts of an assembly go to threads that have nothing to do, whoever did them when it was
