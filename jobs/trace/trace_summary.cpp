@@ -102,7 +102,8 @@ TraceSummary summarize(const Trace& trace, const std::vector<std::size_t>& threa
   summary.lead_s = apart.lead_s;
   summary.tail_s = apart.tail_s;
   for (const std::size_t count : threads) summary.played.emplace_back(count, play(apart, count));
-  summary.without_limit = play(apart, std::max<std::size_t>(apart.tasks.size(), 1));
+  constexpr std::size_t kNoLimit = 1u << 20;  // tasks and parts at a time
+  summary.without_limit = play(apart, kNoLimit);
   return summary;
 }
 

@@ -25,7 +25,7 @@ struct TraceSummary {
   std::vector<std::pair<std::string, double>> done, waited;
   /// On so many threads of one worker, by list scheduling.
   std::vector<std::pair<std::size_t, Playback>> played;
-  Playback without_limit;  ///< with a thread for each task
+  Playback without_limit;  ///< with a thread for all that goes at a time
 };
 
 /// threads: which numbers of threads to play it on.
