@@ -23,6 +23,34 @@ inline void do_in_turn(std::size_t parts, const std::function<void(std::size_t)>
 using Lend = std::function<bool(std::function<void()> work)>;
 inline bool lend_nobody(const std::function<void()>&) { return false; }
 
+/// Parts that several threads take, one after the other.
+class Parts {
+ public:
+  /// what: in traces. All outlive it.
+  Parts(const std::string& what, std::size_t count, const std::function<void(std::size_t)>& part)
+      : what_(what), count_(count), part_(part) {}
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+
+  /// Does one that nobody has begun; false: there is none.
+  bool do_one();
+  /// Waits until there are no helpers; none may come any more.
+  void wait();
+  /// Somebody is about to call help() or remove_helper(). False: each was begun.
+  bool add_helper();
+  void remove_helper();
+  /// Of a helper: does them until each was begun.
+  void help();
+
+ private:
+  const std::string& what_;
+  const std::size_t count_;
+  const std::function<void(std::size_t)>& part_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::size_t next_ = 0, num_helpers_ = 0;
+};
+
 /// Does parts (DoParts) on the calling thread, with whoever has nothing to do meanwhile. Traces
 /// have the whole and its parts under the name `what`.
 void share_parts(const Lend& lend, const std::string& what, std::size_t parts,
@@ -49,15 +77,11 @@ class Team {
   };
 
  private:
-  /// Does parts as long as there are some that nobody has begun; locked before and after.
-  void help(std::unique_lock<std::mutex>& lock);
-
   std::mutex mutex_;
   std::condition_variable changed_;  ///< parts, or the turn
   bool is_taken_ = false;
-  std::string what_;                                        ///< that is made
-  const std::function<void(std::size_t)>* part_ = nullptr;  ///< null: nothing is shared
-  std::size_t count_ = 0, next_ = 0, done_ = 0;
+  std::string what_;        ///< that is made
+  Parts* parts_ = nullptr;  ///< null: nothing is shared
 };
 
 }  // namespace baton

@@ -52,8 +52,10 @@ class ChildProcess {
   ChildProcess& operator=(ChildProcess&& other) noexcept;
   ~ChildProcess();
 
-  /// What ended() says of success, and of a command that is no program.
-  static constexpr const char *kSuccess = "exit code 0", *kCannotBeRun = "exit code 127";
+  /// What ended() says of success, of a wrong command line (ExitCode::usage), and of a command that
+  /// is no program.
+  static constexpr const char *kSuccess = "exit code 0", *kWrongUsage = "exit code 64",
+                              *kCannotBeRun = "exit code 127";
 
   pid_t pid() const { return pid_; }
   /// How it ended: "exit code 2" or "signal 9 (Killed)"; nullopt while it runs.

@@ -15,7 +15,6 @@
 #include <string_view>
 #include <thread>
 
-#include "common/base/exit_codes.h"
 #include "common/base/files.h"
 #include "common/base/legible.h"
 #include "common/base/limits.h"
@@ -177,7 +176,7 @@ Status LocalFarm::tend() {
     if (!end) continue;
     const std::string log = log_of(member.name).string();
     // Another try finds the same command line.
-    if (*end == fmt::format("exit code {}", static_cast<int>(ExitCode::usage)))
+    if (*end == ChildProcess::kWrongUsage)
       return Error{ErrorKind::usage,
                    fmt::format("{} ended ({}): {}", member.name, *end, last_line_of(log))};
     const auto now = std::chrono::steady_clock::now();

@@ -274,7 +274,8 @@ class Player {
       events_.pop();
       now_s_ = event.time_s;
       if (event.kind == EventKind::piece_done) end_piece(event.number);
-      if (event.kind == EventKind::part_done) end_part(event.number, event.version != 0);
+      if (event.kind == EventKind::part_done) end_part(event.number, /*is_helper=*/false);
+      if (event.kind == EventKind::helped_part_done) end_part(event.number, /*is_helper=*/true);
       if (event.kind == EventKind::published) release(event.number);
       if (event.kind == EventKind::work_done && works_[event.number].version == event.version)
         end_work(event.number);
@@ -284,13 +285,12 @@ class Player {
   }
 
  private:
-  enum class EventKind { piece_done, part_done, published, work_done };
+  enum class EventKind { piece_done, part_done, helped_part_done, published, work_done };
   struct Event {
     double time_s;
     EventKind kind;
-    std::size_t number;  ///< of the task or work
-    /// Of the work's state; of a part: 1 where a helper does it.
-    std::size_t version;
+    std::size_t number;   ///< of the task or work
+    std::size_t version;  ///< of the work's state
     std::size_t order;
 
     bool operator>(const Event& other) const {
@@ -364,7 +364,7 @@ class Player {
     ++task.parts_begun;
     if (!is_helper) task.busy_s += part_s;
     stretches_.push_back({now_s_, now_s_ + part_s, 1});
-    add(now_s_ + part_s, EventKind::part_done, number, is_helper ? 1 : 0);
+    add(now_s_ + part_s, is_helper ? EventKind::helped_part_done : EventKind::part_done, number);
   }
   void end_part(std::size_t number, bool is_helper) {
     Task& task = tasks_[number];

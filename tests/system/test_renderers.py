@@ -294,7 +294,7 @@ def the_one_command_says_so(programs, folder):
     check(not (folder / f"frames/frame.{FRAMES:04d}.exr").exists(), "all was done too soon")
     done = programs.run("baton", *command, sets[0], expect=None)
     check(done.returncode not in (OK, IO), f"exit code {done.returncode}")
-    check_says(done.stderr, "renders as what is done was rendered", "--restart")
+    check_says(done.stderr, "renders as what is done was rendered", "--restart", "`baton render --isa` goes on")
     programs.run("baton", *command, sets[-1])
 
     # With --restart it is all by the other one, whoever of worker and job comes first.

@@ -212,7 +212,9 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
   if (status == JobStatus::done) BATON_TRY(write_png_of(job));
   if (status == JobStatus::failed) print_failures(shown->detail);
   if (shown->lacks_renderer && farm_.is_own())
-    return Error{ErrorKind::version, "the job waits for " + shown->detail.waits};
+    return Error{ErrorKind::version, "the job waits for " + shown->detail.waits +
+                                         "; where that is an instruction set of this machine, "
+                                         "`baton render --isa` goes on"};
   if (status == JobStatus::paused || shown->detail.lacks_room)
     tell("{}: the job waits for {}\nto go on: the same command\n",
          status == JobStatus::paused ? "paused" : "stopped", shown->detail.waits);
