@@ -25,7 +25,8 @@ struct TraceSummary {
   std::vector<std::pair<std::string, double>> done, waited;
   /// On so many threads of one worker, by list scheduling.
   std::vector<std::pair<std::size_t, Playback>> played;
-  Playback without_limit;  ///< with a thread for all that goes at a time
+  /// With a thread for all that goes at a time.
+  Playback without_limit;
 };
 
 /// threads: which numbers of threads to play it on.
