@@ -69,6 +69,13 @@ inline constexpr int kMaxFineSites = 256;  ///< sites of pixels whose geometry i
 inline constexpr int kGeometryProbes = 4;
 inline constexpr int kMaxRounds = 65536;
 inline constexpr int kMaxPreroll = 64;  ///< rounds
+inline constexpr int kMaxBounces = 64;
+/// Paths of a pixel and round, for light between surfaces; and of one that shares what they find.
+inline constexpr int kBouncePaths = 16, kSharedBouncePaths = 4;
+/// Side of the blocks of pixels in which they share; tiles are whole numbers of them.
+inline constexpr int kBounceBlock = 8;
+/// Shadow rays of each surface that such a path meets.
+inline constexpr int kBounceRays = 2;
 inline constexpr int kMaxParticles = 64;
 inline constexpr int kMaxPopulations = 2;  // parts of a pixel's particles
 inline constexpr int kMaxCandidates = 8192;

@@ -50,6 +50,8 @@ const std::vector<AovTraits>& table() {
       {"cryptoMaterial",        crypto_channels(kCryptoMaterial),      true,     true,        1},
       {"unshadowed",            rgb("unshadowed"),                     true,     false,       9.3},
       {"blocked",               rgb("blocked"),                        true,     false,       10.7},
+      {"direct",                rgb("direct"),                         true,     false,       10},
+      {"indirect",              rgb("indirect"),                       true,     false,       10},
   };
   // clang-format on
   return kTable;
@@ -81,6 +83,8 @@ std::string_view why_empty(Aov aov, const JobSpec& job) {
       return tells_noise(job) ? ""
                               : "samples that are carried, or that a second pass exchanges, tell "
                                 "nothing of their error";
+    case Aov::indirect:
+      return job.light.bounces > 0 ? "" : "light.bounces is 0";
     case Aov::ess:
       return traits(method).keeps_samples ? "" : "the method's rays have no weights";
     default:

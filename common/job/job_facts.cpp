@@ -22,7 +22,7 @@ bool tells_noise(const JobSpec& job) {
 
 bool draws_twice(const JobSpec& job) {
   return has_aov(job, Aov::variance) && job.quality.rounds == 1 && tells_noise(job) &&
-         !traits(job.sampling.method).tells_variance;
+         !(traits(job.sampling.method).tells_variance && job.light.bounces == 0);
 }
 
 bool has_catcher(const JobSpec& job) { return !catcher_key(job).empty(); }

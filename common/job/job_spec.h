@@ -179,6 +179,17 @@ struct EnvironmentSpec {
   bool operator==(const EnvironmentSpec&) const = default;
 };
 
+// ---- light between surfaces --------------------------------------------------------------------
+struct LightSpec {
+  /// Most surfaces that light meets on its way, beside the one that is seen, [0,
+  /// limits::kMaxBounces].
+  int bounces = 0;
+  /// Glossy surfaces that are seen by way of rough ones are rougher (worker/bounce).
+  bool filter_glossy = true;
+
+  bool operator==(const LightSpec&) const = default;
+};
+
 // ---- sampling -----------------------------------------------------------------------------------
 enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
 /// How `sequential` carries the normalising constant: by the ratio of the weights, or by path
@@ -321,7 +332,9 @@ enum class Aov : std::uint8_t {
   crypto_object,
   crypto_material,
   unshadowed,
-  blocked
+  blocked,
+  direct,
+  indirect
 };
 enum class PixelType : std::uint8_t { half_float, full_float };
 /// How channels are called in frames: as most compositors expect them, or as Blender's passes.
@@ -375,6 +388,7 @@ struct JobSpec {
   CameraSpec camera;
   SceneSpec scene;
   EnvironmentSpec environment;
+  LightSpec light;
   MotionSpec motion;
   SamplingSpec sampling;
   QualitySpec quality;

@@ -51,6 +51,7 @@ enum class PassId : std::uint32_t {
   /// The site that is followed back, and which site inherits a sample.
   reproject = 11,
   neighbor = 12,  ///< which neighbours a pixel asks
+  bounce = 13,    ///< light between surfaces
 };
 
 /// uint32 -> float uniform in [0, 1): the top 24 bits.

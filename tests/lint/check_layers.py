@@ -31,7 +31,7 @@ METHOD_ROOMS = {f"worker/method/{folder.name}" for folder in METHOD_FOLDERS if f
 # What several methods are made of. Passes know those that have to do with history and second pass alone.
 METHOD_LIBRARIES = {f"worker/method/{library}" for library in ("carried", "chosen", "fresh", "weighted")}
 METHODS = METHOD_ROOMS - METHOD_LIBRARIES - {"worker/method/list"}
-PASS = METHOD | {"common/job/text", "worker/method", "worker/method/carried", "worker/method/weighted"}
+PASS = METHOD | {"common/job/text", "worker/bounce", "worker/method", "worker/method/carried", "worker/method/weighted"}
 EXCHANGE = PASS | {"worker/pass"}
 RUN = EXCHANGE | {"common/protocol", "common/store", "common/scene/settle", "worker/exchange"}
 # Programs that measure look into every room of the worker, and share scenes and statistics with the tests.
@@ -63,6 +63,7 @@ MAY_INCLUDE = {
     "worker/surface": SCENE,
     "worker/accel": ACCEL,
     "worker/light": LIGHT,
+    "worker/bounce": METHOD,
     "worker/method": METHOD,
     "worker/method/weighted": METHOD | {"worker/method"},
     "worker/method/carried": METHOD | {"worker/method"},

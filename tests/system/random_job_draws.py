@@ -123,6 +123,7 @@ class Draw(Motion, Pictures, Textures):
             "image.maxSites": lambda: self.pick(None, None, None, 4),
             "image.sites": lambda: self.rng.choice(self.enum("image", "sites") + [4]),
             "maxRetriesPerTask": nothing, "maxSecondsPerTask": nothing, "maxFailuresPerWorker": nothing,
+            "light.bounces": lambda: self.pick(0, 1, 1, 2, 4),
             # Geometry.
             "scene.materials.*.file": self.table,
             "scene.materials.*.clearcoat": lambda: self.pick(None, None, 0.0, 0.4, 1.0),
@@ -165,7 +166,8 @@ class Draw(Motion, Pictures, Textures):
 
     def tile_size(self, job=None):
         size = self.pick(8, 8, 9, 13, 16, 19, 64, 32768)
-        return whole_blocks(size) if job and "adaptiveThreshold" in job.get("quality", {}) else size
+        in_blocks = job and ("adaptiveThreshold" in job.get("quality", {}) or job.get("light", {}).get("bounces"))
+        return whole_blocks(size) if in_blocks else size
 
     def method(self):
         methods = self.enum("sampling", "method")

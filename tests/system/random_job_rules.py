@@ -22,6 +22,7 @@ def work_of(job, num_frames):
     if job.get("visibility", {}).get("correlated"):
         visibility = job["visibility"]
         of_pixel += n * visibility.get("partitions", 16)
+    of_pixel += 16 * 12 * job.get("light", {}).get("bounces", 0)
     rounds = job.get("quality", {}).get("rounds", 1)
     if rounds == 1 and {"variance", "denoise"} & set(job["output"].get("aovs", [])):
         of_pixel *= 2
@@ -115,6 +116,11 @@ def adaptive_rounds(job, _rng):
         image["tileSize"] = whole_blocks(image["tileSize"])
 
 
+def whole_blocks_share_light(job, _rng):
+    if job.get("light", {}).get("bounces") and "tileSize" in job["image"]:
+        job["image"]["tileSize"] = whole_blocks(job["image"]["tileSize"])
+
+
 def more_sites_in_later_rounds(job, rng):
     image, sites = job["image"], job["image"].get("sites", 1)
     most = image.get("maxSites", sites)
@@ -137,6 +143,11 @@ def two_folds_are_of_one_size(job, rng):
 def no_catchers_with_a_second_pass(job, _rng):
     for catcher in catchers(job["scene"]) if is_correlated(job) else []:
         drop_if_true(catcher, "catcher")
+
+
+def no_second_surface_with_a_second_pass(job, _rng):
+    if is_correlated(job):
+        drop_if_true(job.get("light", {}), "bounces")
 
 
 def what_arrives_is_known(job, _rng):
@@ -163,8 +174,9 @@ def one_kind_of_motion(job, _rng):
 
 
 RULES = [at_least_as_many_candidates_as_particles, compensation_is_of_mis, one_target_and_only_of_auto,
-         a_second_pass_of_few_methods, one_round_with_a_second_pass_or_auto, adaptive_rounds, more_sites_in_later_rounds,
-         two_folds_are_of_one_size, no_catchers_with_a_second_pass, what_arrives_is_known,
+         a_second_pass_of_few_methods, one_round_with_a_second_pass_or_auto, adaptive_rounds,
+         whole_blocks_share_light, more_sites_in_later_rounds,
+         two_folds_are_of_one_size, no_catchers_with_a_second_pass, no_second_surface_with_a_second_pass, what_arrives_is_known,
          shadows_in_alpha_of_what_is_transparent, one_kind_of_motion]
 
 

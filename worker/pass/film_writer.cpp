@@ -87,6 +87,12 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
       case Aov::blocked:
         put_vec(pixel.blocked);
         break;
+      case Aov::direct:
+        put_vec(pixel.radiance - pixel.indirect);
+        break;
+      case Aov::indirect:
+        put_vec(pixel.indirect);
+        break;
       case Aov::albedo:
       case Aov::position:
       case Aov::z:

@@ -38,6 +38,7 @@ struct PixelResult {
   Rgb variance{};
   /// Light that shadows take away: `radiance` without them is the sum.
   Rgb blocked{};
+  Rgb indirect{};            ///< part of `radiance` that came by other surfaces
   float error = kNoSurface;  ///< as in the plane kErrorChannel
   float rounds = 1;          ///< number of rounds in this mean
   /// Share of the light that arrives on the catcher, times `catcher`.

@@ -5,15 +5,13 @@ namespace baton {
 Rgb NoiseProbe::sample_again(const PixelMethod& method, const PixelInput& input,
                              const RoundLight& light, const PresampledLight& presampled,
                              const PixelState& pixel, const SiteOrigins& origins) {
-  RngKey key = input.key;
-  key.round = static_cast<std::uint32_t>(kProbeRound.value()) - key.round;
   return aside_.sample(method, input,
                        {.sites = input.sites,
                         .hits = input.hits,
                         .origins = origins,
                         .light = light,
                         .presampled = presampled,
-                        .key = key},
+                        .key = probe_key(input.key)},
                        pixel);
 }
 

@@ -20,6 +20,12 @@ constexpr bool is_probe(std::int32_t x, std::int32_t y, FrameNumber frame, std::
   return place % kProbeSpacing == 0;
 }
 
+/// The address of the numbers that a pixel is drawn with a second time.
+constexpr RngKey probe_key(RngKey key) {
+  key.round = static_cast<std::uint32_t>(kProbeRound.value()) - key.round;
+  return key;
+}
+
 /// Samples pixels a second time: the same sites, what the pixel remembers, and the same method, but
 /// random numbers and presampled light of their own (kProbeRound). Both estimates are independent
 /// given the past and agree in the mean, so half the square of their difference is the variance of

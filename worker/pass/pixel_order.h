@@ -11,13 +11,18 @@
 namespace baton {
 
 /// The order in which the pixels of a round are worked on, in batches: slots of the round. Where
-/// blocks have a memory in common, block by block, and the pixels of a block are in one batch, so
-/// that they all start from what the rounds before have left; else as they come.
+/// blocks of the picture have something in common, block by block, and the pixels of a block are in
+/// one batch: they all start from what the rounds before have left, and share what they find. Else
+/// as they come.
 class PixelOrder {
  public:
+  /// Pixels of what stays together, and of batches.
+  enum class Blocks : std::uint8_t { none, of_memory, of_bounces };
+  static std::size_t block_pixels(Blocks blocks);
+
   /// most: pixels of a batch, at least those of a block.
   explicit PixelOrder(std::size_t most) : most_(most) {}
-  PixelOrder(const PixelRect& rect, const RoundPixels& pixels, bool by_blocks, std::size_t most);
+  PixelOrder(const PixelRect& rect, const RoundPixels& pixels, Blocks by, std::size_t most);
 
   /// Appends the `count` slots after the last one, which stay together: to the last batch, or where
   /// that has no room for them, as a new one. count: [1, most].

@@ -42,6 +42,7 @@ void RoundMean::add(std::size_t index, const PixelResult& pixel, double weight) 
   sum.alpha += weight * double{pixel.alpha};
   add_to(sum.shadow, pixel.shadow, weight);
   add_to(sum.blocked, pixel.blocked, weight);
+  add_to(sum.indirect, pixel.indirect, weight);
   sum.catcher += weight * double{pixel.catcher};
   if (!(pixel.coverage > 0)) return;
   if (sum.weight_seen == 0) sum.material = pixel.material;
@@ -73,6 +74,7 @@ PixelResult RoundMean::mean(const PixelSum& sum) const {
   pixel.radiance = scaled(sum.radiance, 1 / k);
   pixel.alpha = static_cast<float>(sum.alpha / k);
   pixel.blocked = scaled(sum.blocked, 1 / k);
+  pixel.indirect = scaled(sum.indirect, 1 / k);
   pixel.shadow = scaled(sum.shadow, 1 / k);
   pixel.catcher = static_cast<float>(sum.catcher / k);
   pixel.rounds = static_cast<float>(sum.num_rounds);

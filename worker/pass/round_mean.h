@@ -12,7 +12,7 @@ namespace baton {
 
 /// The sums of one pixel over the rounds of its frame.
 struct PixelSum {
-  std::array<double, 3> radiance{}, normal{}, source{}, shadow{}, blocked{};
+  std::array<double, 3> radiance{}, normal{}, source{}, shadow{}, blocked{}, indirect{};
   double alpha = 0, coverage = 0, depth = 0, catcher = 0;
   double lns = 0, arrived = 0;  ///< arrived: Lns x visibility
   double ess_ratio = 0, acceptance = 0, acceptance_local = 0, acceptance_independent = 0;

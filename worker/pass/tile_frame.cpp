@@ -32,6 +32,7 @@ TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const FrameGe
                         has_aov(context.job, Aov::blocked)),
       sampler_(context.method.start()),
       collector_(context.job) {
+  if (context.job.light.bounces > 0) bounces_.emplace(context.job.light, geometry);
   for (const PixelMethod& own : context.own_methods)
     own_samplers_.push_back(own.start ? own.start() : nullptr);
 }
@@ -56,6 +57,7 @@ void TileFrameRenderer::render(const TileRound& at, SampleState& state, RoundMea
     starts.begin(batch, state);
     sample(work, starts, state, batch);
     trace(work, batch);
+    bounce(work, batch);
     shade(work, state, batch);
     show(work, batch, film);
   }
@@ -99,6 +101,7 @@ void TileFrameRenderer::sample(RoundWork& work, PixelStarts& starts, SampleState
         .look_ahead(work.light, has_history,
                     {state, surfaces.pixels.index(slot), surfaces.sees_catcher(slot)});
   };
+  note_again(work, batch);
   SiteBlock sites;
   look_ahead(0);
   for (std::size_t i = 0; i < batch.count(); ++i) {
@@ -164,6 +167,8 @@ void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, s
     }
   }
 
+  start_bounces(work, input, i, pixel, batch);
+
   // Count what the method did.
   result.lns = did.lns;
   result.source = pixel.tile.latest_source(pixel.index);
@@ -173,11 +178,40 @@ void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, s
   stats_.rays_shadow += did.rays_traced;
 }
 
+/// Who is drawn again is so with all whose light it shares.
+void TileFrameRenderer::note_again(const RoundWork& work, PixelBatch& batch) const {
+  if (!bounces_ || !work.probe_light) return;
+  for (const std::uint32_t slot : batch.slots) {
+    const std::size_t index = work.at.surfaces.pixels.index(slot);
+    if (!is_drawn_again(work, index)) continue;
+    const BounceGroup group = work.group(index);
+    if (!batch.has_again(group)) batch.groups_again.push_back(group);
+  }
+}
+
+/// The paths of a pixel, and those of its other draw. i: number of the pixel in its batch.
+void TileFrameRenderer::start_bounces(RoundWork& work, const PixelInput& input, std::size_t i,
+                                      const PixelState& pixel, const PixelBatch& batch) {
+  if (!bounces_ || pixel.sees_catcher || work.at.round < Round(0)) return;
+  const auto number = static_cast<std::uint32_t>(i);
+  const BounceGroup group = work.group(pixel.index);
+  bounces_->add(number, {input.sites, input.hits, input.presampled, input.key, group});
+  if (!batch.has_again(group)) return;
+  const auto [x, y] = work.at.surfaces.rect.place(pixel.index);
+  bounces_->add(number + PixelBatch::kMost,
+                {.sites = input.sites,
+                 .hits = input.hits,
+                 .presampled = work.probe_light->frame.presampled->of(x, y),
+                 .key = probe_key(input.key),
+                 .group = group,
+                 .is_aside = true});
+}
+
 /// Another draw of the pixel, where its error is to be told.
 void TileFrameRenderer::sample_again(RoundWork& work, const PixelInput& input, std::size_t i,
                                      const PixelState& pixel, const SiteOrigins& origins,
                                      PixelBatch& batch) {
-  if (!work.probe_light || !(draws_twice_ || work.is_probe(pixel.index))) return;
+  if (!is_drawn_again(work, pixel.index)) return;
   const auto [x, y] = work.at.surfaces.rect.place(pixel.index);
   batch.again[i] =
       probe_.sample_again(method_of(work.at.surfaces, batch.slots[i]), input, *work.probe_light,
@@ -189,6 +223,15 @@ void TileFrameRenderer::trace(RoundWork& work, PixelBatch& batch) {
   const StageTimer timer(work.seconds.trace);
   geometry_.accel->occluded(batch.rays.rays);
   stats_.rays_shadow += batch.rays.size();
+}
+
+/// Follows the paths of the batch, which its sites have begun.
+void TileFrameRenderer::bounce(RoundWork& work, PixelBatch& batch) {
+  if (!bounces_) return;
+  const StageTimer timer(work.seconds.trace);
+  const std::uint64_t rays_before = bounces_->num_rays();
+  bounces_->follow(work.light.now, batch.indirect);
+  stats_.rays_shadow += bounces_->num_rays() - rays_before;
 }
 
 /// Adds the free rays of each pixel to what is known of it, and tells its method and the second
@@ -209,15 +252,18 @@ void TileFrameRenderer::shade(RoundWork& work, SampleState& state, PixelBatch& b
     const bool all_free = static_cast<std::size_t>(std::popcount(found.is_free)) == count;
     pixel.mask = all_free && !known.blocked ? 1.0f : 0.0f;
     pixel.blocked = known.unshadowed ? *known.unshadowed - pixel.radiance : found.blocked;
+    pixel.indirect = batch.indirect[i];
+    pixel.radiance += pixel.indirect;
 
     // Another draw tells the error of this one.
     pixel.variance = known.variance;
     pixel.error = kErrorUnknown;
-    if (const std::optional<Rgb>& again = batch.again[i]) {
-      const Rgb difference = pixel.radiance - *again;
+    if (batch.again[i]) {
+      const Rgb again = *batch.again[i] + batch.indirect[PixelBatch::kMost + i];
+      const Rgb difference = pixel.radiance - again;
       if (draws_twice_) pixel.variance = difference * difference * 0.5f;
       if (work.is_probe(index))
-        pixel.error = static_cast<float>(squared_error(mean(pixel.radiance), mean(*again)));
+        pixel.error = static_cast<float>(squared_error(mean(pixel.radiance), mean(again)));
     }
 
     const FoundRays rays{.sample = std::span(batch.rays.sample).subspan(first, count),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "worker/pass/catcher.h"
@@ -38,6 +39,7 @@ class TileFrameRenderer {
   /// The stages of a batch in their order; each reads what those before it have left there.
   void sample(RoundWork& work, PixelStarts& starts, SampleState& state, PixelBatch& batch);
   void trace(RoundWork& work, PixelBatch& batch);
+  void bounce(RoundWork& work, PixelBatch& batch);
   void shade(RoundWork& work, SampleState& state, PixelBatch& batch);
   void show(RoundWork& work, PixelBatch& batch, RoundMean& film);
 
@@ -48,6 +50,13 @@ class TileFrameRenderer {
   void sample_again(RoundWork& work, const PixelInput& input, std::size_t i,
                     const PixelState& pixel, const SiteOrigins& origins, PixelBatch& batch);
 
+  bool is_drawn_again(const RoundWork& work, std::size_t index) const {
+    return work.probe_light && (draws_twice_ || work.is_probe(index));
+  }
+  void note_again(const RoundWork& work, PixelBatch& batch) const;
+  void start_bounces(RoundWork& work, const PixelInput& input, std::size_t i,
+                     const PixelState& pixel, const PixelBatch& batch);
+
   /// The method of a slot's first surface: its material's own, or the job's.
   const PixelMethod& method_of(const TileSurfaces& surfaces, std::size_t slot) const;
   TileSampler& sampler_of(const TileSurfaces& surfaces, std::size_t slot) const;
@@ -57,6 +66,7 @@ class TileFrameRenderer {
   const bool draws_twice_, wants_unshadowed_;
   std::unique_ptr<TileSampler> sampler_;                    ///< of the job's method
   std::vector<std::unique_ptr<TileSampler>> own_samplers_;  ///< (materials); null: `sampler_`
+  std::optional<BounceWalk> bounces_;                       ///< none: light meets no second surface
   NoiseProbe probe_;
   CatcherEdge edge_;
   FirstPassCollector collector_;

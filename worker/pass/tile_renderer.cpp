@@ -60,7 +60,6 @@ Status check_previous(const RenderContext& context, const TileRun& run,
 
 /// What sites see takes 120 bytes each, which their pixels' methods read soon after.
 constexpr std::size_t kSitesInCache = 4096;
-constexpr std::size_t kPixelsOfBlock = std::size_t{PixelBlocks::kSide} * PixelBlocks::kSide;
 
 /// The pixels of a preroll round: one of each square of kPrerollSide, in each round another.
 RoundPixels preroll_pixels(const PixelRect& rect, Round round) {
@@ -202,13 +201,16 @@ class TileWalk {
   /// where these are kept.
   std::vector<RoundPart> parts_of(RoundPixels pixels, bool are_kept) const {
     std::vector<RoundPart> parts;
-    const bool by_blocks = !state_.block_planes.empty();
+    using Blocks = PixelOrder::Blocks;
+    const Blocks by = context_.job.light.bounces > 0 ? Blocks::of_bounces
+                      : state_.block_planes.empty()  ? Blocks::none
+                                                     : Blocks::of_memory;
     if (are_kept && pixels.are_all(state_.num_pixels())) {
-      PixelOrder order(rect_, pixels, by_blocks, PixelBatch::kMost);
+      PixelOrder order(rect_, pixels, by, PixelBatch::kMost);
       parts.push_back({std::move(pixels), std::move(order)});
       return parts;
     }
-    const PixelOrder order(rect_, pixels, by_blocks, kPixelsOfBlock);
+    const PixelOrder order(rect_, pixels, by, PixelOrder::block_pixels(by));
     std::size_t room = 0;
     for (std::size_t i = 0; i < order.num_batches(); ++i) {
       const std::span<const std::uint32_t> batch = order.batch(i);

@@ -26,6 +26,12 @@ bool RoundWork::is_probe(std::size_t index) const {
   return baton::is_probe(x, y, at.frame.number, job.seed);
 }
 
+BounceGroup RoundWork::group(std::size_t index) const {
+  const auto [x, y] = at.surfaces.rect.place(index);
+  return BounceGroup::of(job.seed, at.frame.number.value(), job.image.width, x, y,
+                         at.frame.round_of_frame(at.round));
+}
+
 void PixelBatch::begin(std::span<const std::uint32_t> new_slots) {
   slots = new_slots;
   rays.clear();
@@ -34,6 +40,8 @@ void PixelBatch::begin(std::span<const std::uint32_t> new_slots) {
   pixels.fill({});
   emission.fill({});
   again.fill({});
+  indirect.fill({});
+  groups_again.clear();
 }
 
 }  // namespace baton

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "common/job/task.h"
+#include "worker/bounce/bounce_walk.h"
 #include "worker/method/pixel_method.h"
 #include "worker/pass/catcher_albedo.h"
 #include "worker/pass/film_writer.h"
@@ -50,6 +52,8 @@ struct RoundWork {
 
   RngKey key(std::size_t index) const;
   bool is_probe(std::size_t index) const;
+  /// Who shares light between surfaces with a pixel.
+  BounceGroup group(std::size_t index) const;
 
   const TileRound& at;
   const JobSpec& job;
@@ -74,8 +78,16 @@ struct PixelBatch {
   Column<PixelResult> pixels;        ///< what the film gets
   Column<Rgb> emission;              ///< emission of what pixels see
   Column<std::optional<Rgb>> again;  ///< radiance once more, where it is wanted
+  /// What comes by other surfaces; the second half: once more, as `again`.
+  std::array<Rgb, 2 * kMost> indirect;
+  /// Groups of the pixels that are drawn again.
+  std::vector<BounceGroup> groups_again;
 
   std::size_t count() const { return slots.size(); }
+  bool has_again(const BounceGroup& group) const {
+    return std::ranges::any_of(groups_again,
+                               [&](const BounceGroup& one) { return one.is_same(group); });
+  }
   /// Makes room for other pixels.
   void begin(std::span<const std::uint32_t> new_slots);
 };

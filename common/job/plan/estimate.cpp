@@ -61,6 +61,8 @@ JobEstimate estimate_job(const JobSpec& job) {
       job.image.most_sites() * (rounds_have_own_sites(job) ? e.rounds : job.quality.sweeps);
   if (has_fine_sites(job)) e.primary_rays_per_pixel += limits::kGeometryProbes;
   e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling) * e.rounds;
+  e.shadow_rays_per_pixel +=
+      e.rounds * job.light.bounces * limits::kBouncePaths * (1 + limits::kBounceRays);
   if (draws_twice(job)) e.shadow_rays_per_pixel *= 2;
 
   // Add up the planes: R, G, B, A and the AOVs.

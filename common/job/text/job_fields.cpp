@@ -191,6 +191,11 @@ void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampl
   }
 }
 
+void fields(JobArchive& a, LightSpec& light) {
+  a.integer("bounces", light.bounces, 0, limits::kMaxBounces);
+  a.boolean("filterGlossy", light.filter_glossy);
+}
+
 void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
   if (output.directory.empty()) output.directory = job.name + "-frames";
   a.path("directory", output.directory);
@@ -270,6 +275,20 @@ void check_max_sites(JobArchive& a, const JobSpec& job) {
   }
 }
 
+/// Whether light between surfaces can be rendered.
+void check_bounces(JobArchive& a, const JobSpec& job) {
+  if (job.light.bounces == 0) return;
+  const auto refuse = [&](const std::string& why) {
+    a.fault("light", "bounces 0, as " + why, std::to_string(job.light.bounces));
+  };
+  if (job.visibility.correlated) {
+    refuse("visibility.correlated is true, which knows direct light alone");
+  } else if (job.image.tile_size % limits::kBounceBlock != 0) {
+    refuse(fmt::format("image.tileSize, {}, is no multiple of {}", job.image.tile_size,
+                       limits::kBounceBlock));
+  }
+}
+
 /// Whether the method says what light would arrive if none were blocked.
 void check_unshadowed(JobArchive& a, const JobSpec& job) {
   for (const Aov aov : {Aov::unshadowed, Aov::blocked}) {
@@ -310,6 +329,7 @@ void check_whole(JobArchive& a, const JobSpec& job) {
   }
   check_adaptive(a, job);
   check_max_sites(a, job);
+  check_bounces(a, job);
   check_unshadowed(a, job);
   const JobEstimate estimate = estimate_job(job);
   if (estimate.tasks() > limits::kMaxTasksPerJob) {
@@ -344,6 +364,7 @@ void fields(JobArchive& a, JobSpec& job) {
     a.fault("camera", "no node, as there is no scene.gltf that has it",
             fmt::format("\"{}\"", job.camera.node));
   a.object(required("environment"), [&] { fields(a, job.environment, job.frames); });
+  a.object("light", [&] { fields(a, job.light); });
   a.object("motion", [&] { fields(a, job.motion); });
   a.object("sampling", [&] { fields(a, job.sampling, job.scene); });
   a.object("quality", [&] { fields(a, job.quality, job.sampling); });

@@ -65,6 +65,12 @@ std::string json_path(std::string_view pointer) {
   return path;
 }
 
+/// Whether a value says nothing of this job: earlier pictures, which were without light between
+/// surfaces, keep their names.
+bool is_idle(std::string_view path, const JobSpec& job) {
+  return path.starts_with("/light/") && job.light.bounces == 0;
+}
+
 using Facts = std::map<std::string, std::string>;
 
 /// The job as its films are made.
@@ -89,7 +95,8 @@ Facts picture_facts(const JobSpec& job, const std::vector<AssetDigest>& assets) 
   Facts facts;
   const nlohmann::json all = nlohmann::json::parse(to_json(with_few_keys(job))).flatten();
   for (const auto& [path, value] : all.items()) {
-    if (!is_setting(path) && !is_key(path)) facts.emplace(json_path(path), value.dump());
+    if (!is_setting(path) && !is_key(path) && !is_idle(path, job))
+      facts.emplace(json_path(path), value.dump());
   }
   // Whether anything moves decides how all frames follow their history.
   if (!job.camera.keys.empty()) facts.emplace("$.camera.keys", "given");

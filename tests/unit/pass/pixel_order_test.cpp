@@ -18,12 +18,13 @@ std::vector<std::uint32_t> all_slots(const PixelOrder& order) {
 }
 
 TEST(PixelOrder, GoesRowByRowWithoutBlocks) {
-  const PixelOrder order({0, 0, 10, 13}, RoundPixels::all(130), false, 64);
+  const PixelOrder order({0, 0, 10, 13}, RoundPixels::all(130), PixelOrder::Blocks::none, 64);
   EXPECT_EQ(order.num_batches(), 3u);
   const std::vector<std::uint32_t> slots = all_slots(order);
   EXPECT_EQ(slots.size(), 130u);
   EXPECT_TRUE(std::ranges::is_sorted(slots));
-  EXPECT_EQ(PixelOrder({0, 0, 1, 1}, RoundPixels(), false, 64).num_batches(), 0u);
+  EXPECT_EQ(PixelOrder({0, 0, 1, 1}, RoundPixels(), PixelOrder::Blocks::none, 64).num_batches(),
+            0u);
 }
 
 // What is appended stays together, in batches as full as that allows.
@@ -55,7 +56,7 @@ TEST(PixelOrder, KeepsBlocksTogether) {
     }
     const PixelBlocks blocks(rect);
     for (const RoundPixels& pixels : {some, RoundPixels::all(num_pixels)}) {
-      const PixelOrder order(rect, pixels, true, 64);
+      const PixelOrder order(rect, pixels, PixelOrder::Blocks::of_memory, 64);
       std::vector<std::uint32_t> slots = all_slots(order);
       std::set<std::size_t> done;
       for (std::size_t i = 0; i < order.num_batches(); ++i) {

@@ -290,7 +290,7 @@ TEST(Reprojection, BlocksTakeTheirMemoryAlong) {
   SampleState state;
   state.resize(memory_format(true), rect, 0);
   const RoundPixels pixels = RoundPixels::all(state.num_pixels());
-  const PixelOrder order(rect, pixels, true, 64);
+  const PixelOrder order(rect, pixels, PixelOrder::Blocks::of_memory, 64);
   for (std::size_t i = 0; i < order.num_batches(); ++i) {
     reprojection.look_up(surfaces, order.batch(i), context->frames[1]);
     reprojection.inherit_blocks(surfaces, order.batch(i), state);

@@ -1,0 +1,158 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/base/limits.h"
+#include "common/job/job_spec.h"
+#include "common/math/philox.h"
+#include "worker/accel/geometry_sequence.h"
+#include "worker/light/presampled_light.h"
+
+namespace baton {
+
+/// Pixels that share what their paths find: a square of 4 x 4 in a block of the picture, which goes
+/// on at the block's other edges and lies elsewhere in each round.
+struct BounceGroup {
+  static constexpr std::int32_t kSide = limits::kBounceBlock / 2;
+  static constexpr std::uint32_t kMembers = kSide * kSide, kGroups = 4;
+
+  RngKey block;              ///< of the block's first pixel
+  std::uint32_t number = 0;  ///< [0, kGroups)
+  /// [0, kMembers), another one for each pixel of a group: the same in all rounds.
+  std::uint32_t member = 0;
+
+  /// That of pixel (x, y) of an image. Other arguments as of pixel_key.
+  static BounceGroup of(std::uint64_t job_seed, std::int32_t frame, std::int32_t image_width,
+                        std::int32_t x, std::int32_t y, std::int32_t round);
+  bool is_same(const BounceGroup& b) const {
+    return block.pixel == b.block.pixel && number == b.number;
+  }
+};
+
+/// What a pixel's paths begin with.
+struct BounceStart {
+  const SiteBlock& sites;            ///< at least one of them sees a surface
+  std::span<const SurfaceHit> hits;  ///< (S) what they are made of
+  /// Candidates for the light of all surfaces on the way; must outlive the walk.
+  const PresampledLight& presampled;
+  RngKey key;  ///< of the pixel in its round
+  /// Who shares what it finds.
+  BounceGroup group;
+  /// A draw that no image has (noise_probe.h): with points of its own.
+  bool is_aside = false;
+};
+
+/// Light that reaches pixels over other surfaces: paths of at most `bounces` surfaces beside the
+/// one that is seen. A pixel draws directions of its sites' BRDFs in a round, by one
+/// low-discrepancy sequence over paths and rounds, so they may not depend on what earlier rounds
+/// found. A surface that a path meets is lit by a few candidates of the presampled light, of which
+/// some are kept and traced [Talbot et al. 2005], where it is glossy also by one of its BRDF
+/// (balance heuristic); it adds what it emits; and under Russian roulette the path goes on. What
+/// misses all surfaces adds nothing: the method has counted it.
+///
+/// Pixels that see matt surfaces share what they find: 16 of a block of the picture, in each round
+/// others (BounceGroup), draw from one sequence. The light of a matt surface that one of them has
+/// met is handed to all that see it, in proportion to the density with which each would have met it
+/// (balance heuristic over the traced visibilities). So the pixels of a group are in one walk.
+///
+/// Unbiased, unless glossy surfaces behind rough ones are made rougher (LightSpec::filter_glossy).
+class BounceWalk {
+ public:
+  /// Paths of a pixel and round, of one that shares, and shadow rays of each surface that they
+  /// meet.
+  static constexpr std::uint32_t kPaths = limits::kBouncePaths,
+                                 kSharedPaths = limits::kSharedBouncePaths,
+                                 kRays = limits::kBounceRays;
+
+  /// spec.bounces > 0. geometry: of the frame, must outlive the object.
+  BounceWalk(const LightSpec& spec, const FrameGeometry& geometry)
+      : spec_(spec), geometry_(geometry) {}
+
+  /// Starts the paths of pixel `pixel` of a walk.
+  void add(std::uint32_t pixel, const BounceStart& start);
+  /// Follows all paths that were started, and forgets them. light: of the round. found: (pixels),
+  /// is added to: the mean over the sites of each pixel, those without a surface included.
+  void follow(const EnvironmentView& light, std::span<Rgb> found);
+
+  /// Rays traced so far, of all kinds.
+  std::uint64_t num_rays() const { return num_rays_; }
+
+ private:
+  /// What is the same for the paths of a pixel.
+  struct Start {
+    const PresampledLight* presampled;
+    RngKey key;
+  };
+  /// The first piece of a path, and what comes along it.
+  struct First {
+    std::uint32_t pixel;  ///< of the walk
+    /// Light of the pixel per radiance.
+    Rgb weight;
+    bool is_member;  ///< of an exchange
+    Rgb radiance{};
+    /// The surface that it has met, if it looks the same to all: where rays from it start, and its
+    /// geometric normal.
+    bool is_shared = false;
+    Vec3 origin{}, ng{};
+  };
+  /// A path on its way to the next surface.
+  struct Path {
+    Ray ray;
+    /// Radiance of its first piece per radiance along the ray.
+    Rgb throughput;
+    /// Of the cone that textures are averaged over: its width at the origin, and its growth per
+    /// distance.
+    float width = 0, spread = 0;
+    /// Density of the roughest scattering so far, 1/sr.
+    float least_pdf = 0;
+    std::uint32_t first = 0;   ///< index into firsts_
+    std::uint32_t number = 0;  ///< of the path in its pixel
+    std::uint32_t start = 0;   ///< index into starts_
+  };
+  /// A matt surface that takes part in an exchange.
+  struct Member {
+    Vec3 origin, ns, ng;
+    Rgb weight;           ///< albedo, as a share of the pixel's light
+    std::uint32_t pixel;  ///< of the walk
+    std::int32_t first;   ///< index of its path, or -1: it has none
+  };
+  /// The members of a group, at one of their paths.
+  struct Exchange {
+    BounceGroup group;
+    std::uint32_t path;
+    bool is_aside;
+    std::vector<Member> members;
+  };
+  struct Surfaces;
+
+  void add_alone(std::uint32_t pixel, const BounceStart& start);
+  void add_member(std::uint32_t pixel, const BounceStart& start);
+  void push_path(std::uint32_t pixel, const SurfaceHit& hit, const Vec3& direction, float pdf,
+                 std::uint32_t number, const Rgb& weight, bool is_member);
+  std::vector<Member>& exchange_of(const BounceStart& start, std::uint32_t path);
+  void shade(std::span<const std::size_t> met, std::int32_t bounce, const EnvironmentView& light);
+  void light_up(const Surfaces& at, std::int32_t bounce, const EnvironmentView& light);
+  void go_on(const Surfaces& at, std::int32_t bounce);
+  void share(std::span<const Member> members, std::span<Rgb> found);
+  Rng random_of(const Path& path) const;
+
+  const LightSpec& spec_;
+  const FrameGeometry& geometry_;
+  std::vector<Start> starts_;
+  std::vector<First> firsts_;
+  std::vector<Path> paths_, next_;
+  std::vector<Exchange> exchanges_;  ///< the first num_exchanges_; the others are memory
+  std::size_t num_exchanges_ = 0;
+  std::vector<Ray> rays_;
+  std::vector<SurfaceHit> hits_;
+  ShadowRays shadows_;
+  std::vector<Rgb> values_;                ///< (shadows_) what each adds if it is free
+  std::vector<std::uint32_t> firsts_lit_;  ///< (shadows_) to whose radiance
+  std::vector<float> densities_;           ///< of an exchange, (surfaces x members)
+  std::uint64_t num_rays_ = 0;
+};
+
+}  // namespace baton
