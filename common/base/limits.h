@@ -74,8 +74,8 @@ inline constexpr int kMaxBounces = 64;
 inline constexpr int kBouncePaths = 16, kSharedBouncePaths = 4;
 /// Side of the blocks of pixels in which they share; tiles are whole numbers of them.
 inline constexpr int kBounceBlock = 8;
-/// Shadow rays of each surface that such a path meets.
-inline constexpr int kBounceRays = 2;
+/// Shadow rays of each surface that such a path meets; and of one whose light is shared.
+inline constexpr int kBounceRays = 2, kSharedBounceRays = 4;
 inline constexpr int kMaxParticles = 64;
 inline constexpr int kMaxPopulations = 2;  // parts of a pixel's particles
 inline constexpr int kMaxCandidates = 8192;

@@ -6,7 +6,10 @@ namespace baton {
 
 void AttemptBook::add_failure(TaskIndex task, const Failure& failure) {
   has_failed_ = true;
-  ended_[task].push_back({failure.lease, failure.worker, true, failure.permanent});
+  constexpr std::size_t kMostShown = 300;
+  const std::size_t end = std::min(failure.message.find('\n'), kMostShown);
+  ended_[task].push_back(
+      {failure.lease, failure.worker, true, failure.permanent, failure.message.substr(0, end)});
   ++num_lost_;
 }
 
@@ -53,6 +56,7 @@ std::map<std::string, Blame> AttemptBook::blame(TaskIndex task) const {
     Blame& of_worker = blame[attempt.worker];
     ++of_worker.failures;
     of_worker.for_good |= attempt.for_good;
+    of_worker.message = attempt.message;
   }
   return blame;
 }

@@ -15,6 +15,7 @@ struct Blame {
   std::int32_t failures = 0;
   /// It said that no retry of its own can help.
   bool for_good = false;
+  std::string message = {};  ///< of the last failure, its first line
 };
 
 /// Which attempts at the tasks of a job have come to nothing, and through whom.
@@ -45,6 +46,7 @@ class AttemptBook {
     LeaseId lease;
     std::string worker;
     bool failed = false, for_good = false;
+    std::string message = {};
   };
   std::map<TaskIndex, std::vector<Ended>> ended_;
   std::map<TaskIndex, std::int32_t> losses_;

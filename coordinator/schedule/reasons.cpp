@@ -76,12 +76,17 @@ Cause running_of(const Lease& lease) {
 
 std::string room_text(const Scheduler& scheduler, const Scheduler::Job& job) {
   const JobGraph& graph = job.tasks.graph();
+  const std::uint64_t ended = scheduler.kept_bytes();
+  const auto open = std::ranges::count_if(scheduler.jobs(), [&](const Digest& digest) {
+    return is_open(scheduler.find_job(digest)->status);
+  });
   return fmt::format(
       "room in the store: it holds {} of the {} that --store-limit allows, {} of them of jobs that "
-      "have ended, and the next task needs about {}: raise the limit, or delete ended jobs",
-      bytes_text(scheduler.store_bytes()), bytes_text(scheduler.room().limit),
-      bytes_text(scheduler.kept_bytes()),
-      bytes_text(job.sizes.largest(graph, graph.key(*job.tasks.book().ready().begin()))));
+      "have ended and the rest of {}, and the next task needs about {}: raise the limit{}",
+      bytes_text(scheduler.store_bytes()), bytes_text(scheduler.room().limit), bytes_text(ended),
+      open == 1 ? "this one" : fmt::format("{} open ones", open),
+      bytes_text(job.sizes.largest(graph, graph.key(*job.tasks.book().ready().begin()))),
+      ended > 0 ? ", or delete ended jobs (`baton job list --all`)" : "");
 }
 
 }  // namespace
@@ -212,16 +217,43 @@ std::optional<Cause> Reasons::nobody_for(const Digest& digest, const Scheduler::
     cause.workers.clear();
     return cause;
   }
-  if (!somebody_may_try(crew, job.tasks.attempts().blame(task))) {
-    cause.kind = ReasonKind::tried;
-    return cause;
-  }
+  if (!somebody_may_try(crew, job.tasks.attempts().blame(task)))
+    return tried(digest, job, task, alike);
   if (std::ranges::all_of(
           alike, [&](const auto& w) { return conduct_.draining.contains(w) || is_blind(w); })) {
     cause.kind = ReasonKind::draining;
     return cause;
   }
   return std::nullopt;
+}
+
+/// A worker gets nothing of a job, for that cause.
+void Reasons::leave_out(const Cause& cause, Chain& chain) const {
+  chain.push_back(cause);
+  chain.back().kind = ReasonKind::left_out;
+  chain.back().text = cause.kind == ReasonKind::renderer ? "does not render with " + cause.text
+                      : cause.kind == ReasonKind::blind  ? "does not see " + cause.text
+                                                         : "rests from it after failures";
+}
+
+/// Those of the workers that have failed the task, with what they said last, or rest from the job
+/// after other failures.
+Cause Reasons::tried(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
+                     const std::vector<std::string>& workers) const {
+  Cause cause{.kind = ReasonKind::tried, .job = digest, .task = job.tasks.graph().key(task)};
+  const TaskBlame blame = job.tasks.attempts().blame(task);
+  for (const std::string& worker : workers) {
+    const auto found = blame.find(worker);
+    if (found != blame.end()) {
+      cause.count += static_cast<std::size_t>(found->second.failures);
+      cause.text = found->second.message;
+    } else if (!job.standings.has_failed_much(worker, now_)) {
+      continue;  // it is left out for something else
+    }
+    cause.workers.push_back(worker);
+  }
+  if (cause.workers.empty()) cause.workers = workers;
+  return cause;
 }
 
 /// Why a ready task is not granted. Returns another task of the job that explains it further.
@@ -231,6 +263,10 @@ std::optional<TaskIndex> Reasons::explain_ready(const Digest& digest, const Sche
   const JobGraph& graph = job.tasks.graph();
   const TaskKey key = graph.key(task);
   if (const auto cause = nobody_for(digest, job, task)) {
+    if (cause->kind == ReasonKind::tried) {
+      for (const std::string& worker : leases.alike(renderer_of(digest, job, leases)))
+        if (job.standings.is_blind(worker, now_)) leave_out(*refusal(worker, digest, job), chain);
+    }
     chain.push_back(*cause);
     return std::nullopt;
   }
@@ -250,18 +286,13 @@ std::optional<TaskIndex> Reasons::explain_ready(const Digest& digest, const Sche
   const std::vector<std::string>& alike = leases.alike(renderer_of(digest, job, leases));
   for (const std::string& worker : alike) {
     if (const auto cause = refusal(worker, digest, job)) {
-      chain.push_back(*cause);
-      chain.back().kind = ReasonKind::left_out;
-      chain.back().text = cause->kind == ReasonKind::renderer
-                              ? "does not render with " + cause->text
-                          : cause->kind == ReasonKind::blind ? "does not see " + cause->text
-                                                             : "rests from it after failures";
+      leave_out(*cause, chain);
     } else if (!conduct_.draining.contains(worker) && job.is_due(task, worker, crew)) {
       able.push_back(worker);
     }
   }
   if (able.empty()) {
-    chain.push_back({.kind = ReasonKind::tried, .job = digest, .task = key, .workers = alike});
+    chain.push_back(tried(digest, job, task, alike));
     return std::nullopt;
   }
   std::vector<std::string> readers = able;

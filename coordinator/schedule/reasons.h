@@ -19,12 +19,13 @@ struct Cause {
   /// Of input and order: the task that comes first.
   std::optional<TaskKey> awaited = {};
   std::vector<std::string> workers = {};
-  /// A folder, a renderer, or what a disk said.
+  /// A folder, a renderer, or what a disk said; of tried: what the last one to fail said.
   std::string text = {};
   /// When the task was granted; of silent: the last sign of life of the one that said nothing for
   /// longest.
   std::optional<TimePoint> since = {};
-  std::size_t count = 0;  ///< of links that are left out
+  /// Of links that are left out; of tried: failures of the task.
+  std::size_t count = 0;
   /// Of busy: whose tasks the workers have, each once. Of no_job: those that are paused.
   std::vector<Digest> jobs = {};
   std::uint64_t need_bytes = 0, free_bytes = 0;
@@ -62,6 +63,9 @@ class Reasons {
                                          TaskIndex task, Chain& chain) const;
   std::optional<Cause> nobody_for(const Digest& digest, const Scheduler::Job& job,
                                   TaskIndex task) const;
+  Cause tried(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
+              const std::vector<std::string>& workers) const;
+  void leave_out(const Cause& cause, Chain& chain) const;
   std::optional<TaskIndex> chosen_for(const std::string& worker, const Scheduler::Job& job) const;
   void explain_free(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
                     const std::string& worker, Chain& chain) const;

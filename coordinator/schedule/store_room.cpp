@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace baton {
+namespace {
+
+/// By this share of the limit the store may hold more, so that a run that was begun ends.
+constexpr std::uint64_t kSlackShare = 8;
+
+}  // namespace
 
 std::uint64_t unmade_bytes(const JobInStore& job, Run end) {
   const JobGraph& graph = job.graph;
@@ -24,14 +30,18 @@ bool has_room(const StoreRoom& room, const JobInStore& job, std::span<const JobI
               TaskIndex task, bool others_wait) {
   const TaskKey key = job.graph.key(task);
   if (room.limit == 0 || key.kind == TaskKind::assemble) return true;
-  if (!room.fits(job.sizes.largest(job.graph, key))) {
-    // Where sizes are estimated and nobody works, one task tells more.
-    return room.is_idle && !job.sizes.are_known(job.graph, key) && room.used < room.limit;
+  const bool is_render = key.kind == TaskKind::render;
+  const Run run = is_render ? key.run() : job.graph.timeline().run_of(key.step());
+  const std::uint64_t largest = job.sizes.largest(job.graph, key);
+  if (!room.fits(largest)) {
+    if (!room.is_idle) return false;
+    // Where sizes are estimated and nobody works, one task tells more. What was begun is finished
+    // although tiles turn out larger than those before.
+    if (!job.sizes.are_known(job.graph, key)) return room.used < room.limit;
+    return run < job.begun_runs && room.used + largest <= room.limit + room.limit / kSlackShare;
   }
   // What an idle farm does not begin nobody begins.
   if (room.is_idle) return true;
-  const bool is_render = key.kind == TaskKind::render;
-  const Run run = is_render ? key.run() : job.graph.timeline().run_of(key.step());
   // What is lost of earlier runs, and made again, comes first.
   if (run < job.begun_runs) return room.used + unmade_bytes(job, run) <= room.limit;
   if (others_wait) return false;

@@ -11,7 +11,8 @@ namespace baton {
 /// What the store holds, against its limit. Tasks add states and films, and only assembly and later
 /// frames take them away. So what may be begun is finished: a run of frames is begun when there is
 /// room for all of it beside all runs in work, and a task is granted when there is room for what it
-/// makes.
+/// makes. Sizes of what is not made are those of what was: where they fall short, and nobody works,
+/// a run that was begun may take an eighth of the limit more.
 struct StoreRoom {
   std::uint64_t limit = 0;     ///< 0: none
   std::uint64_t used = 0;      ///< by blobs that somebody needs

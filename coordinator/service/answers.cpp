@@ -357,6 +357,20 @@ std::string Answers::busy_text(const Cause& cause) const {
                      cause.workers.size() == 1 ? "has" : "have", fmt::join(jobs, "; of "));
 }
 
+namespace {
+
+/// What the workers have done, behind their names.
+std::string tried_text(const Cause& cause, const std::string& place) {
+  const bool many = cause.workers.size() > 1;
+  if (cause.count == 0)
+    return fmt::format("{} from its tasks after failures of others", many ? "rest" : "rests");
+  return fmt::format("{} failed {}, {}{}", many ? "have" : "has", place,
+                     cause.count == 1 ? "once" : fmt::format("{} times", cause.count),
+                     cause.text.empty() ? "" : ", the last time: " + cause.text);
+}
+
+}  // namespace
+
 std::string Answers::text_of(const Cause& cause) const {
   const std::string who = names_text(cause.workers);
   const bool many = cause.workers.size() > 1;
@@ -389,8 +403,7 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::blind:
       return fmt::format("{} {} not see {}", who, many ? "do" : "does", cause.text);
     case ReasonKind::tried:
-      return fmt::format("{} {} failed {}, or {} from it after failures", who,
-                         many ? "have" : "has", place(cause), many ? "rest" : "rests");
+      return fmt::format("{} {}", who, tried_text(cause, place(cause)));
     case ReasonKind::store:
       return fmt::format("the store has no room for {}: it needs {}, free {}", place(cause),
                          bytes_text(cause.need_bytes), bytes_text(cause.free_bytes));

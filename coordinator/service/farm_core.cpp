@@ -11,6 +11,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/store/folder_token.h"
+#include "coordinator/schedule/reasons.h"
 #include "coordinator/service/diagnostics_file.h"
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"
@@ -103,7 +104,26 @@ Status FarmCore::check_own(const Speaker& speaker, const Digest& job) const {
                   owner.empty() ? "nobody" : fmt::format("'{}'", owner), speaker.name)};
 }
 
+/// What versions that have made way for others keep.
+Status FarmCore::let_superseded_go() {
+  for (const Digest& version : history.jobs().superseded()) {
+    BATON_ASSIGN(const std::vector<Digest> kept, journal.kept_blobs(version));
+    if (kept.empty()) continue;
+    spdlog::info("job {}: {} blobs that an earlier version left go, as the store has no room",
+                 history.name_of(version), kept.size());
+    for (const Digest& blob : kept) BATON_TRY(journal.let_go(version, blob));
+    garbage.add(kept);
+  }
+  superseded_keep_ = false;
+  return {};
+}
+
 Status FarmCore::count_kept() {
+  if (superseded_keep_ && options.store_limit > 0) {
+    const bool lacks = std::ranges::any_of(
+        scheduler.in_turn(), [&](const Digest& job) { return lacks_room(scheduler, job); });
+    if (lacks) BATON_TRY(let_superseded_go());
+  }
   BATON_ASSIGN(const std::uint64_t bytes, journal.kept_bytes());
   if (std::exchange(kept_bytes_, bytes) == bytes) return {};
   return step(StoreKeeps{bytes});
@@ -151,6 +171,7 @@ Status FarmCore::archive_ended() {
 Status FarmCore::archive_job(const Digest& digest) {
   const Scheduler::Job* const job = scheduler.find_job(digest);
   if (job == nullptr || is_open(job->status)) return {};
+  superseded_keep_ = true;
   std::vector<BlobRef> kept;
   for (TaskIndex task = job->tasks.graph().num_frames(); task < job->tasks.graph().num_tasks();
        ++task) {

@@ -125,7 +125,8 @@ class FarmCore {
   /// A job that has ended leaves the memory; what people may ask of it, and its blobs that a later
   /// job may go on from, stand in the archive. One that is there, or runs again, stays as it is.
   Status archive_job(const Digest& job);
-  /// Tells the scheduler what ended jobs leave in the store.
+  /// Tells the scheduler what ended jobs leave in the store. Where an open job has no room, what
+  /// earlier versions of jobs left goes before: nobody can ask for it by name.
   Status count_kept();
   /// Describes a job that the scheduler has.
   Result<JobDetail> living_detail(const Digest& job);
@@ -156,6 +157,8 @@ class FarmCore {
   Status perform(const ReportConflict& action);
   Status perform(const RemoveBlobs& action);
 
+  Status let_superseded_go();
+
   Result<FolderRecord*> record_of(const Digest& job);
   Result<std::vector<Digest>> replaceable(const LeaseId& lease);
 
@@ -170,6 +173,7 @@ class FarmCore {
   std::map<Digest, FolderRecord> records_;            ///< of folders of open jobs, once asked for
   /// That the archive keeps, as the scheduler was told.
   std::uint64_t kept_bytes_ = 0;
+  bool superseded_keep_ = true;  ///< versions that are not the newest may
 };
 
 }  // namespace baton

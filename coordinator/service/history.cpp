@@ -68,7 +68,8 @@ Status History::tell(FarmEvent event) {
   return journal_.record_event(event);
 }
 
-Status History::submitted(const Digest& document, const JobId& job, const std::string& reason) {
+Status History::submitted(const Digest& document, const JobId& job, const std::string& reason,
+                          bool is_told) {
   const bool is_changed = !jobs_.is_newest(document) && !jobs_.versions(job).empty();
   if (!jobs_.is_newest(document)) BATON_TRY(jobs_.add_version(journal_, document, job));
   JobTimes times = jobs_.of(document).times;
@@ -79,6 +80,10 @@ Status History::submitted(const Digest& document, const JobId& job, const std::s
   }
   times.ended_ms = 0;
   BATON_TRY(jobs_.set_times(journal_, job, times));
+  if (!is_told) {
+    quiet_.insert(job);
+    return {};
+  }
   return tell({.kind = is_changed ? FarmEventKind::job_changed : FarmEventKind::job_submitted,
                .job = job,
                .reason = reason});
@@ -93,6 +98,7 @@ Status History::status_changed(const Digest& version, JobStatus status, const st
   times.ended_ms = is_open(status) ? 0 : now_ms();
   // Where nothing had to be rendered, it was done when it was.
   const auto before = before_.find(job.id);
+  const bool is_told = quiet_.erase(job.id) == 0 || status != JobStatus::done;
   if (status == JobStatus::done && before != before_.end()) times = before->second;
   if (!is_open(status) && before != before_.end()) before_.erase(before);
   if (status == JobStatus::done && times.started_ms == 0) times.started_ms = times.ended_ms;
@@ -100,6 +106,7 @@ Status History::status_changed(const Digest& version, JobStatus status, const st
   const double seconds = times.ended_ms == 0 || times.started_ms == 0
                              ? 0
                              : static_cast<double>(times.ended_ms - times.started_ms) / 1000;
+  if (!is_told) return {};
   return tell({.kind = kind_of(status), .job = job.id, .reason = reason, .seconds = seconds});
 }
 
@@ -136,6 +143,7 @@ Status History::prioritized(const Digest& version, std::int32_t before,
 Status History::granted(const Scheduler::Job& job, const LeaseId& lease, const std::string& worker,
                         const std::string& reason) {
   const JobIdentity who = jobs_.of(lease.job);
+  quiet_.erase(who.id);
   before_.erase(who.id);
   if (who.times.started_ms == 0) {
     JobTimes times = who.times;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 
 #include "coordinator/journal/journal.h"
@@ -35,7 +36,9 @@ class History {
 
   /// The document is the job's newest version, and runs, from now on.
   /// reason: of the submission; of a job that is known, what becomes another comes after it.
-  Status submitted(const Digest& document, const JobId& job, const std::string& reason);
+  /// is_told: as an event; else it only looks whether it ends as it was.
+  Status submitted(const Digest& document, const JobId& job, const std::string& reason,
+                   bool is_told = true);
   Status status_changed(const Digest& version, JobStatus status, const std::string& reason);
   Status deleted(const Digest& version);
   /// Frames of the job count as done from now on, or no longer. changed_ms: since when (JobLocks);
@@ -73,6 +76,8 @@ class History {
   EtaBook etas_;
   /// Of jobs that had ended and go on, of which nothing has been granted since.
   std::map<JobId, JobTimes> before_;
+  /// Of before_: those that go on only to end as they were, of which nobody is told.
+  std::set<JobId> quiet_;
   std::string actor_;
 };
 

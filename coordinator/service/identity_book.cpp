@@ -65,6 +65,14 @@ bool IdentityBook::is_newest(const Digest& document) const {
   return jobs_.at(version->second.id).versions.rbegin()->second == document;
 }
 
+std::vector<Digest> IdentityBook::superseded() const {
+  std::vector<Digest> superseded;
+  for (const auto& [document, version] : documents_) {
+    if (!is_newest(document)) superseded.push_back(document);
+  }
+  return superseded;
+}
+
 std::vector<Digest> IdentityBook::versions(const JobId& job) const {
   std::vector<Digest> documents;
   const auto found = jobs_.find(job);

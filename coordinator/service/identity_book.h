@@ -30,6 +30,8 @@ class IdentityBook {
   bool is_newest(const Digest& document) const;
   /// Oldest first; none where the job is not known.
   std::vector<Digest> versions(const JobId& job) const;
+  /// The versions that are not the newest of their job.
+  std::vector<Digest> superseded() const;
   std::size_t num_jobs() const { return jobs_.size(); }
 
   /// The document is the job's newest version from now on.

@@ -26,11 +26,42 @@ std::vector<FrameNumber> finished_frames(const Scheduler::Job& job) {
   return frames;
 }
 
-std::string describe(const Scheduler::Job& job, const Failure& failure) {
-  const TaskKey& task = failure.lease.task;
-  if (!job.tasks.graph().find(task)) return failure.message;
-  return fmt::format("{} on {}: {}", place_text(place_of(job, task)), failure.worker,
-                     failure.message);
+/// What a failure says, without the command that repeats its task alone.
+std::string_view cause_of(const Failure& failure) {
+  return std::string_view(failure.message).substr(0, failure.message.find("\nto replay it alone"));
+}
+
+/// A line for each worker and cause, in the order in which each came last.
+std::vector<std::string> describe(const Scheduler::Job& job, const std::vector<Failure>& failures) {
+  struct Alike {
+    const Failure* last;
+    std::size_t count;
+  };
+  std::vector<Alike> causes;
+  for (const Failure& failure : failures) {
+    const auto found = std::ranges::find_if(causes, [&](const Alike& alike) {
+      return alike.last->worker == failure.worker && cause_of(*alike.last) == cause_of(failure);
+    });
+    std::size_t count = 1;
+    if (found != causes.end()) {
+      count += found->count;
+      causes.erase(found);
+    }
+    causes.push_back({&failure, count});
+  }
+  std::vector<std::string> lines;
+  for (const auto& [last, count] : causes) {
+    const TaskKey& task = last->lease.task;
+    if (!job.tasks.graph().find(task)) {
+      lines.push_back(last->message);
+      continue;
+    }
+    const std::string place = place_text(place_of(job, task));
+    lines.push_back(fmt::format(
+        "{} on {}: {}", count == 1 ? place : fmt::format("{} failures, the last {}", count, place),
+        last->worker, last->message));
+  }
+  return lines;
 }
 
 }  // namespace
@@ -62,7 +93,7 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
                        const std::vector<Failure>& failures) {
   const Scheduler::Job& job = *scheduler.find_job(digest);
   JobDetail detail{summarize(digest, job), finished_frames(job), {}};
-  for (const Failure& failure : failures) detail.failures.push_back(describe(job, failure));
+  detail.failures = describe(job, failures);
   for (const auto& [frame, stats] : job.tasks.frames()) {
     const FrameNumber number = job.spec.frames[frame.index()];
     detail.frames.push_back(

@@ -224,7 +224,8 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
   std::string changes = changes_text(document, id, message.keep_priority);
   if (message.restart) changes = changes.empty() ? "restart" : "restart; " + changes;
   if (!again_.empty()) changes = "frames are wanted again";
-  BATON_TRY(farm_.history.submitted(document.digest, id, changes));
+  // Nobody has asked for what is looked at again after an unlock.
+  BATON_TRY(farm_.history.submitted(document.digest, id, changes, !peer.empty()));
   if (!message.keep_priority)
     BATON_TRY(farm_.history.forget_priority(document.digest, document.job.priority));
   if (message.restart) BATON_TRY(farm_.give_up(document.digest, strange));

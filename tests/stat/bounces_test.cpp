@@ -45,7 +45,7 @@ std::string open_sphere(double open) {
 /// The inside of such a sphere under light that is the same from everywhere.
 JobSpec furnace(double open, float albedo, int bounces, int rounds) {
   JobSpec job = test::box_job();
-  job.image = {.width = 6, .height = 6, .sites = 1, .tile_size = 4096};
+  job.image = {.width = 24, .height = 24, .sites = 1, .tile_size = 4096};
   job.camera = {
       .position = {0, 0, 0.2f}, .look_at = {0.3f, 0, -1}, .up = {0, 1, 0}, .vertical_fov_deg = 60};
   job.scene = {};
@@ -60,36 +60,39 @@ JobSpec furnace(double open, float albedo, int bounces, int rounds) {
   job.sampling.num_candidates = 64;
   job.quality.rounds = rounds;
   job.light.bounces = bounces;
+  job.output.aovs = {Aov::indirect};
   return job;
 }
 
 /// Each inner point sees the share `open` of its cosine-weighted directions open, wherever it is:
-/// albedo * open * sum_k (albedo (1 - open))^k.
+/// albedo * open * sum_k (albedo (1 - open))^k, of which k = 0 is direct.
 double furnace_light(double open, double albedo, int bounces) {
   double sum = 0, term = albedo * open;
-  for (int k = 0; k <= bounces; ++k, term *= albedo * (1 - open)) sum += term;
+  for (int k = 1; k <= bounces; ++k) sum += term *= albedo * (1 - open);
   return sum;
 }
 
+/// What came by other surfaces.
+std::vector<double> indirect(const FilmTile& film) { return test::mean_rgb(film, "indirect"); }
+
 // H0: the mean is the closed form. |z| < 3.5: level 5e-4 for each number of bounces. Seeds 1 to
-// 12. What is resolved, 3.9 standard errors, is below .3 %; of one open sphere in the long run
-// .05 %.
+// 12. What is resolved, 3.9 standard errors, is below 1 %.
 TEST(Bounces, FurnaceHasItsClosedForm) {
-  constexpr double kOpen = 0.1, kAlbedo = 0.8;
-  for (const int bounces : {0, 1, 2, 4, 12}) {
+  constexpr double kOpen = 0.5, kAlbedo = 0.8;
+  for (const int bounces : {1, 3, 12}) {
     const double truth = furnace_light(kOpen, kAlbedo, bounces);
     const Estimate seen =
-        test::repeat(furnace(kOpen, static_cast<float>(kAlbedo), bounces, 16), 12);
+        test::repeat(furnace(kOpen, static_cast<float>(kAlbedo), bounces, 16), 12, indirect);
     const double error = std::sqrt(seen.image_variance);
     EXPECT_LT(std::fabs(seen.image_mean - truth) / error, 3.5) << bounces << " bounces";
-    EXPECT_LT(test::kResolvedErrors * error / truth, 0.003);
+    EXPECT_LT(test::kResolvedErrors * error / truth, 0.01);
     std::printf("  %d bounces: %+.3f %% (%.3f)\n", bounces, 100 * (seen.image_mean / truth - 1),
                 100 * error / truth);
   }
 }
 
-/// Paths of cosine- and lobe-sampled directions that add what they find where they leave the
-/// scene, and nothing else.
+/// Paths of cosine- and lobe-sampled directions, which add what they find where they leave the
+/// scene and what glows on the way: what is seen directly left out.
 class PathTracer {
  public:
   explicit PathTracer(const JobSpec& job)
@@ -124,7 +127,7 @@ class PathTracer {
              .pixel = static_cast<std::uint32_t>(pixel)},
             PassId::reference);
     Rgb weight{1, 1, 1};
-    double found = mean(geometry_->see(hit).emission);
+    double found = 0;
     for (int bounce = 0; bounce <= job_.light.bounces; ++bounce) {
       const SeenSurface seen = geometry_->see(hit);
       const auto u = rng.uniforms(static_cast<std::uint32_t>(bounce), 0);
@@ -141,6 +144,7 @@ class PathTracer {
       geometry_->accel->intersect({&ray, 1}, {&hit, 1});
       if (!hit.hit) {
         const EnvironmentMap::Texel light = light_->now.evaluate(wi);
+        if (bounce == 0) return 0;
         return found + mean(weight * Rgb{light.r, light.g, light.b});
       }
       if (bounce < job_.light.bounces) found += mean(weight * geometry_->see(hit).emission);
@@ -174,23 +178,25 @@ JobSpec room(Method method, int bounces) {
   job.scene.objects.push_back(wall("ground", 0, -1.5f, 4, 0.2f));
   job.output.background = Background::transparent;
   job.light = {.bounces = bounces, .filter_glossy = false};
+  job.output.aovs = {Aov::indirect};
   return job;
 }
 
 // H0: pixels and the image's mean are those of the path tracer; levels as for all methods
 // (against_brute_force.h). Seeds 1 to 48.
 void expect_same_as_paths(const JobSpec& job, double max_resolution) {
-  const Estimate truth = PathTracer(job).render(30000), seen = test::repeat(job, 48);
+  const Estimate truth = PathTracer(job).render(40000), seen = test::repeat(job, 48, indirect);
   const test::Verdict v = test::compare(seen, truth);
   EXPECT_LT(v.worst_pixel, test::kPixelLimit);
   EXPECT_LT(v.image, test::kImageLimit);
   EXPECT_LT(v.resolution, max_resolution);
-  std::printf("  image |z| %.2f, worst pixel |z| %.2f, resolves a bias of %.2f %%\n", v.image,
-              v.worst_pixel, 100 * v.resolution);
+  std::printf("  %+.3f %%, |z| %.2f, worst pixel |z| %.2f, resolves a bias of %.2f %%\n",
+              100 * (seen.image_mean / truth.image_mean - 1), v.image, v.worst_pixel,
+              100 * v.resolution);
 }
 
 TEST(Bounces, RoomAgreesWithPaths) {
-  for (const int bounces : {1, 2, 5}) expect_same_as_paths(room(Method::pool, bounces), 0.01);
+  for (const int bounces : {1, 2, 5}) expect_same_as_paths(room(Method::pool, bounces), 0.035);
 }
 TEST(Bounces, CoatsAgreeWithPaths) {
   JobSpec job = room(Method::pool, 2);
@@ -200,7 +206,7 @@ TEST(Bounces, CoatsAgreeWithPaths) {
                                    .clearcoat = 1.0f,
                                    .clearcoat_roughness = 0.5f};
   job.scene.materials["green"].emission = {0, 0.5f, 0.1f};
-  expect_same_as_paths(job, 0.01);
+  expect_same_as_paths(job, 0.035);
 }
 
 }  // namespace

@@ -9,6 +9,15 @@
 #include "worker/surface/scene_kernels.h"
 
 namespace baton {
+
+/// One candidate of a surface: where light comes from, and how much over the density of all ways to
+/// draw it: reflected, and before that.
+struct BounceCandidate {
+  Vec3 direction;
+  Rgb value, arriving;
+  float weight = 0;  ///< mean of the value
+};
+
 namespace {
 
 /// Surfaces that are worked on together: lanes for the kernels, and their targets stay in the
@@ -59,6 +68,12 @@ struct Pairs {
     poison(*this);
     count = 0;
   }
+  void add(std::size_t at, const Vec3& way) {
+    site[count] = static_cast<std::int32_t>(at);
+    direction.x[count] = way.x;
+    direction.y[count] = way.y;
+    direction.z[count++] = way.z;
+  }
   void add(std::size_t at, float u, float v) {
     site[count] = static_cast<std::int32_t>(at);
     u0[count] = u;
@@ -92,19 +107,48 @@ void roughen(Material& material, float alpha) {
   if (material.coat.weight > 0) material.coat.alpha = std::max(material.coat.alpha, alpha);
 }
 
-/// One candidate of a surface: where light comes from, and how much over the density of all ways to
-/// draw it.
-struct Candidate {
-  Vec3 direction;
-  Rgb value;
-  float weight = 0;  ///< mean of the value
-};
+using Candidate = BounceCandidate;
+
 Candidate candidate(const Vec3& direction, const Rgb& reflected, const Rgb& radiance,
                     float light_density, float own_density) {
   const float density = static_cast<float>(kFromLight) * std::abs(light_density) + own_density;
   if (!(density > 0)) return {};
-  const Rgb value = reflected * radiance / density;
-  return {direction, value, mean(value)};
+  const Rgb arriving = radiance / density;
+  const Rgb value = reflected * arriving;
+  return {direction, value, arriving, mean(value)};
+}
+
+/// Alpha from which on a lobe's paths are worth sharing.
+constexpr float kRoughLobe = 0.3f;
+/// Share of a pixel's paths that sharp lobes may take where it shares.
+constexpr float kMostSharp = 0.5f;
+
+/// Whether the sites of a pixel reflect so sharply that others meet nothing for it.
+bool is_sharp(const SiteBlock& sites) {
+  if (sites.num_lobes == 0) return false;
+  float sharp = 0;
+  for (std::int32_t i = 0; i < sites.num_lobes; ++i) {
+    const auto site = static_cast<std::size_t>(sites.lobe_sites[static_cast<std::size_t>(i)]);
+    const float in_coat = sites.any_coat ? sites.coats.chance[site] : 0;
+    const bool is_rough = sites.is_ggx[site] > 0 && sites.shape[site] >= kRoughLobe;
+    sharp += sites.specular_probability[site] * (is_rough ? in_coat : 1);
+  }
+  return sharp > kMostSharp * static_cast<float>(sites.num_hits);
+}
+
+/// What a surface reflects alike to all sides of all that it reflects: the albedo of a Lambertian
+/// surface about the mesh's normal. It depends on nothing but the place: not on who looks.
+Rgb alike_albedo(const Material& material) {
+  switch (material.lobe) {
+    case Material::Lobe::none:
+    case Material::Lobe::phong:
+      return material.kd;
+    case Material::Lobe::ggx:
+      return material.kd * (Rgb{1, 1, 1} - material.dielectric_f0);
+    case Material::Lobe::measured:
+      break;
+  }
+  return {};
 }
 
 }  // namespace
@@ -113,7 +157,18 @@ Candidate candidate(const Vec3& direction, const Rgb& reflected, const Rgb& radi
 struct BounceWalk::Surfaces {
   SiteBlock sites;
   std::array<std::size_t, kBlock> path;  ///< indices of paths and hits
+  /// alike_albedo over pi of those that are shared, else 0; and the normal that it is about.
+  std::array<Rgb, kBlock> alike;
+  std::array<Vec3, kBlock> ns;
   std::size_t count = 0;
+
+  bool is_shared(std::size_t i) const { return mean(alike[i]) > 0; }
+  /// What of the light from a direction is reflected alike.
+  Rgb reflected_alike(std::size_t i, const Vec3& direction) const {
+    const Vec3 ng{sites.ng_x[i], sites.ng_y[i], sites.ng_z[i]};
+    if (!(dot(ng, direction) > 0)) return {};
+    return alike[i] * std::max(dot(ns[i], direction), 0.0f);
+  }
 };
 
 Rng BounceWalk::random_of(const Path& path) const {
@@ -158,41 +213,45 @@ class Turns {
 
 bool sees_surface(const SurfaceHit& hit) { return hit.hit && !hit.is_catcher; }
 
-/// Whether a surface looks the same from everywhere above it.
-bool is_matt(const Material& material) {
-  const bool bends = material.detail != nullptr && material.detail->has(DetailImage::normal);
-  return material.lobe == Material::Lobe::none && !(material.coat.weight > 0) && !bends;
-}
-
 }  // namespace
 
 void BounceWalk::push_path(std::uint32_t pixel, const SurfaceHit& hit, const Vec3& direction,
-                           float pdf, std::uint32_t number, const Rgb& weight, bool is_member) {
+                           float pdf, std::uint32_t number, const Rgb& weight, Kind kind) {
   paths_.push_back({.ray = {hit.ray_origin, direction},
                     .throughput = {1, 1, 1},
+                    .shared = {1, 1, 1},
                     .width = hit.place.width,
                     .spread = kConeShare / std::sqrt(pdf),
                     .least_pdf = pdf,
                     .first = static_cast<std::uint32_t>(firsts_.size()),
                     .number = number,
                     .start = static_cast<std::uint32_t>(starts_.size() - 1)});
-  firsts_.push_back({.pixel = pixel, .weight = weight, .is_member = is_member});
+  firsts_.push_back({.pixel = pixel, .weight = weight, .kind = kind});
+}
+
+BounceWalk::BounceWalk(const LightSpec& spec, const FrameGeometry& geometry)
+    : spec_(spec), geometry_(geometry) {
+  has_metal_ = std::ranges::any_of(geometry.scene->materials, [](const Material& material) {
+    return material.specular_probability > kMostSharp || material.lobe == Material::Lobe::measured;
+  });
 }
 
 void BounceWalk::add(std::uint32_t pixel, const BounceStart& start) {
   starts_.push_back({&start.presampled, start.key});
-  const SiteBlock& sites = start.sites;
-  const bool is_glossy = sites.any_phong || sites.any_ggx || sites.any_measured || sites.any_coat;
-  is_glossy ? add_alone(pixel, start) : add_member(pixel, start);
+  if (is_sharp(start.sites)) return add_own(pixel, start, 0, Kind::alone);
+  add_member(pixel, start);
+  if (has_metal_) add_own(pixel, start, kSharedPaths, Kind::rest);
 }
 
-void BounceWalk::add_alone(std::uint32_t pixel, const BounceStart& start) {
+/// Paths that belong to the pixel alone, from that number on.
+void BounceWalk::add_own(std::uint32_t pixel, const BounceStart& start, std::uint32_t first_path,
+                         Kind kind) {
   const Points points(start.key, start.is_aside);
-  const Turns turns(start, kPaths);
+  const Turns turns(start, kPaths - first_path);
   Pairs<kPaths> first;
   std::array<std::uint32_t, kPaths> number;
-  for (std::uint32_t k = 0; k < kPaths; ++k) {
-    const std::size_t site = turns[k];
+  for (std::uint32_t k = first_path; k < kPaths; ++k) {
+    const std::size_t site = turns[k - first_path];
     if (!sees_surface(start.hits[site])) continue;
     const auto u = points[start.key.round * kPaths + k];
     number[first.count] = k;
@@ -205,7 +264,7 @@ void BounceWalk::add_alone(std::uint32_t pixel, const BounceStart& start) {
     const Rgb reflected = first.reflected[i];
     if (!(pdf > 0) || !(mean(reflected) > 0)) continue;
     push_path(pixel, start.hits[static_cast<std::size_t>(first.site[i])], first.direction[i], pdf,
-              number[i], reflected / (pdf * static_cast<float>(kPaths)), false);
+              number[i], reflected / (pdf * static_cast<float>(kPaths)), kind);
   }
 }
 
@@ -222,21 +281,21 @@ BounceGroup BounceGroup::of(std::uint64_t job_seed, std::int32_t frame, std::int
           .member = static_cast<std::uint32_t>((y & (kSide - 1)) * kSide + (x & (kSide - 1)))};
 }
 
-std::vector<BounceWalk::Member>& BounceWalk::exchange_of(const BounceStart& start,
-                                                         std::uint32_t path) {
+BounceWalk::Exchange& BounceWalk::exchange_of(const BounceStart& start, std::uint32_t path) {
   const auto used = std::span(exchanges_).first(num_exchanges_);
   const auto found = std::ranges::find_if(used, [&](const Exchange& exchange) {
     return exchange.path == path && exchange.is_aside == start.is_aside &&
            exchange.group.is_same(start.group);
   });
-  if (found != used.end()) return found->members;
+  if (found != used.end()) return *found;
   if (num_exchanges_ == exchanges_.size()) exchanges_.emplace_back();
   Exchange& next = exchanges_[num_exchanges_++];
   next.group = start.group;
   next.path = path;
   next.is_aside = start.is_aside;
   next.members.clear();
-  return next.members;
+  next.sites.clear(BounceGroup::kMembers);
+  return next;
 }
 
 void BounceWalk::add_member(std::uint32_t pixel, const BounceStart& start) {
@@ -249,10 +308,7 @@ void BounceWalk::add_member(std::uint32_t pixel, const BounceStart& start) {
   std::array<std::uint32_t, kSharedPaths> number;
   for (std::uint32_t k = 0; k < kSharedPaths; ++k) {
     const std::size_t site = turns[k];
-    // What reflects nothing draws nothing that others could take.
-    if (!sees_surface(start.hits[site]) ||
-        !(sites.kd_r[site] + sites.kd_g[site] + sites.kd_b[site] > 0))
-      continue;
+    if (!sees_surface(start.hits[site])) continue;
     // A pixel has another point of its group's each time, and so has each of its sites.
     const std::uint32_t turn = start.key.round * kSharedPaths + k;
     const std::uint32_t member = (group.member + turn + start.key.round) % kMembers;
@@ -262,24 +318,22 @@ void BounceWalk::add_member(std::uint32_t pixel, const BounceStart& start) {
   }
   first.draw(sites);
   first.evaluate(sites);
+  const std::uint32_t num_own = has_metal_ ? kPaths : kSharedPaths;
   for (std::size_t i = 0; i < first.count; ++i) {
     const auto site = static_cast<std::size_t>(first.site[i]);
     const SurfaceHit& hit = start.hits[site];
-    Member member{.origin = hit.ray_origin,
-                  .ns = {sites.ns_x[site], sites.ns_y[site], sites.ns_z[site]},
-                  .ng = {sites.ng_x[site], sites.ng_y[site], sites.ng_z[site]},
-                  .weight = Rgb{sites.kd_r[site], sites.kd_g[site], sites.kd_b[site]} /
-                            static_cast<float>(kSharedPaths),
-                  .pixel = pixel,
-                  .first = -1};
+    Member member{.origin = hit.ray_origin, .pixel = pixel, .first = -1};
     const float pdf = first.density[i];
     const Rgb reflected = first.reflected[i];
     if (pdf > 0 && mean(reflected) > 0) {
       member.first = static_cast<std::int32_t>(firsts_.size());
       push_path(pixel, hit, first.direction[i], pdf, number[i],
-                reflected / (pdf * static_cast<float>(kSharedPaths)), true);
+                reflected / (pdf * static_cast<float>(num_own)), Kind::member);
     }
-    exchange_of(start, number[i]).push_back(member);
+    Exchange& exchange = exchange_of(start, number[i]);
+    exchange.sites.add_copy(static_cast<int>(exchange.members.size()), sites,
+                            static_cast<int>(site));
+    exchange.members.push_back(member);
   }
 }
 
@@ -293,12 +347,11 @@ void BounceWalk::follow(const EnvironmentView& light, std::span<Rgb> found) {
 
     next_.clear();
     shadows_.clear();
-    values_.clear();
-    firsts_lit_.clear();
+    lit_.clear();
     std::array<std::size_t, kBlock> met;
     std::size_t count = 0;
     for (std::size_t i = 0; i < hits_.size(); ++i) {
-      if (hits_[i].hit) met[count++] = i;
+      if (hits_[i].hit && is_wanted(i, bounce)) met[count++] = i;
       if (count == kBlock || (count > 0 && i + 1 == hits_.size())) {
         shade(std::span(met).first(count), bounce, light);
         count = 0;
@@ -307,16 +360,19 @@ void BounceWalk::follow(const EnvironmentView& light, std::span<Rgb> found) {
     geometry_.accel->occluded(shadows_);
     num_rays_ += shadows_.size();
     for (std::size_t i = 0; i < shadows_.size(); ++i) {
-      if (!(shadows_.t_far[i] < 0)) firsts_[firsts_lit_[i]].radiance += values_[i];
+      if (shadows_.t_far[i] < 0) continue;
+      First& first = firsts_[lit_[i].first];
+      first.radiance += lit_[i].radiance;
+      first.shared += lit_[i].shared;
     }
     std::swap(paths_, next_);
   }
 
   // Hand out.
   for (const First& first : firsts_) {
-    if (!first.is_shared) found[first.pixel] += first.weight * first.radiance;
+    found[first.pixel] += first.weight * (first.radiance - first.shared);
   }
-  for (std::size_t i = 0; i < num_exchanges_; ++i) share(exchanges_[i].members, found);
+  for (std::size_t i = 0; i < num_exchanges_; ++i) share(exchanges_[i], found);
   num_exchanges_ = 0;
   paths_.clear();
   firsts_.clear();
@@ -324,47 +380,68 @@ void BounceWalk::follow(const EnvironmentView& light, std::span<Rgb> found) {
 }
 
 /// Hands the light of surfaces that members have met to all that see them.
-void BounceWalk::share(std::span<const Member> members, std::span<Rgb> found) {
+void BounceWalk::share(const Exchange& exchange, std::span<Rgb> found) {
+  constexpr std::size_t kMost = BounceGroup::kMembers;
+  const std::span<const Member> members = exchange.members;
+  // Who sees what: pairs in the order of the surfaces, their finders first.
+  Pairs<kMost * kMost> pairs;
+  std::array<float, kMost * kMost> measure;  // cos / d^2 at the surface
+  std::array<std::size_t, kMost + 1> end;
+  std::array<const First*, kMost> met;
+  std::size_t num_met = 0;
   shadows_.clear();
-  densities_.clear();
-  const auto is_met = [&](const Member& member) {
-    if (member.first < 0) return false;
-    const First& first = firsts_[static_cast<std::size_t>(member.first)];
-    return first.is_shared && mean(first.radiance) > 0;
-  };
-  for (const Member& met : members) {
-    if (!is_met(met)) continue;
-    const First& first = firsts_[static_cast<std::size_t>(met.first)];
-    for (const Member& member : members) {
-      const Vec3 way = first.origin - member.origin;
-      const float above = std::min(dot(way, member.ns), dot(way, member.ng));
+  for (const Member& finder : members) {
+    if (finder.first < 0) continue;
+    const First& first = firsts_[static_cast<std::size_t>(finder.first)];
+    if (!(mean(first.shared) > 0)) continue;
+    met[num_met] = &first;
+    const auto add = [&](std::size_t i) {
+      const Vec3 way = first.origin - members[i].origin;
       const float facing = -dot(way, first.ng), d2 = dot(way, way);
-      const bool sees = (above > 0 && facing > 0) || &member == &met;
-      // cos cos / d^2 of directions that are not of length 1; the factor 1 / pi is everyone's.
-      densities_.push_back(sees ? std::abs(dot(way, member.ns) * facing) / (d2 * d2) : 0);
-      if (!sees || &member == &met) continue;
-      shadows_.push(member.origin, way);
+      if (!(facing > 0 && d2 > 0)) return;
+      const float inverse = 1 / std::sqrt(d2);
+      measure[pairs.count] = facing * inverse / d2;
+      pairs.add(i, way * inverse);
+      shadows_.push(members[i].origin, way);
       shadows_.t_far[shadows_.size() - 1] = 1;
-    }
+    };
+    for (std::size_t i = 0; i < members.size(); ++i) add(i);
+    end[num_met++] = pairs.count;
   }
+  if (pairs.count == 0) return;
+  pairs.evaluate(exchange.sites);
+  // Its finder sees a surface.
   geometry_.accel->occluded(shadows_);
   num_rays_ += shadows_.size();
 
-  std::size_t ray = 0, first_density = 0;
-  for (const Member& met : members) {
-    if (!is_met(met)) continue;
-    const auto density = std::span(densities_).subspan(first_density, members.size());
-    first_density += members.size();
+  std::size_t begin = 0;
+  for (std::size_t m = 0; m < num_met; begin = end[m++]) {
     float sum = 0;
-    for (std::size_t i = 0; i < members.size(); ++i) {
-      if (&members[i] != &met && density[i] > 0 && shadows_.t_far[ray++] < 0) density[i] = 0;
-      sum += density[i];
+    for (std::size_t n = begin; n < end[m]; ++n) {
+      const Member& member = members[static_cast<std::size_t>(pairs.site[n])];
+      const bool is_finder =
+          member.first >= 0 && &firsts_[static_cast<std::size_t>(member.first)] == met[m];
+      // A path is drawn where it reflects something.
+      const bool draws = mean(pairs.reflected[n]) > 0;
+      if (!draws || (!is_finder && shadows_.t_far[n] < 0)) measure[n] = 0;
+      sum += measure[n] * pairs.density[n];
     }
     if (!(sum > 0) || !std::isfinite(sum)) continue;
-    const Rgb radiance = firsts_[static_cast<std::size_t>(met.first)].radiance;
-    for (std::size_t i = 0; i < members.size(); ++i)
-      found[members[i].pixel] += members[i].weight * radiance * (density[i] / sum);
+    const float scale = 1 / (sum * static_cast<float>(kSharedPaths));
+    for (std::size_t n = begin; n < end[m]; ++n) {
+      if (measure[n] > 0)
+        found[members[static_cast<std::size_t>(pairs.site[n])].pixel] +=
+            pairs.reflected[n] * met[m]->shared * (measure[n] * scale);
+    }
   }
+}
+
+/// Whether a surface that a path has met can add to it.
+bool BounceWalk::is_wanted(std::size_t path, std::int32_t bounce) const {
+  if (bounce > 1 || firsts_[paths_[path].first].kind != Kind::rest) return true;
+  const Material& material = geometry_.material_of(hits_[path]);
+  return material.lobe != Material::Lobe::none || material.coat.weight > 0 ||
+         (material.detail != nullptr && material.detail->has(DetailImage::normal));
 }
 
 /// What paths find at the surfaces that they have met. met: indices of paths.
@@ -384,93 +461,126 @@ void BounceWalk::shade(std::span<const std::size_t> met, std::int32_t bounce,
     if (spec_.filter_glossy) roughen(seen.material, least_alpha(path.least_pdf));
     at.sites.add(static_cast<int>(i), seen.point, seen.material);
     First& first = firsts_[path.first];
+    at.alike[i] = {};
+    if (bounce == 1 && first.kind != Kind::alone) {
+      at.alike[i] = alike_albedo(seen.material) * kInvPi;
+      at.ns[i] = hit.point.ns;
+      first.origin = hit.ray_origin;
+      first.ng = hit.point.ng;
+      path.shared = at.is_shared(i) ? Rgb{1, 1, 1} : Rgb{};
+    } else if (bounce == 1) {
+      path.shared = {};
+    }
     first.radiance += path.throughput * seen.emission;
-    if (bounce > 1 || !first.is_member || !is_matt(seen.material)) continue;
-    first.origin = hit.ray_origin;
-    first.ng = seen.point.ng;
-    first.is_shared = true;
+    first.shared += path.shared * seen.emission;
   }
   light_up(at, bounce, light);
   if (bounce < spec_.bounces) go_on(at, bounce);
 }
 
-/// Shadow rays to some of the light.
-void BounceWalk::light_up(const Surfaces& at, std::int32_t bounce, const EnvironmentView& light) {
-  if (starts_[paths_[at.path[0]].start].presampled->empty()) return;  // a black map
+namespace {
+
+/// Candidates of the light of some surfaces.
+struct LightCandidates {
+  /// All of a surface; value 0 where it has none of its BRDF.
+  using OfSurface = std::array<Candidate, kFromLight + 1>;
+
   Pairs<kBlock * kFromLight> from_light;
   Colors<kBlock * kFromLight> radiance;
   std::array<float, kBlock * kFromLight> density;
-  Pairs<kBlock> own;
-  std::array<float, kBlock> choice;
+  Pairs<kBlock> own;  ///< of the BRDF
+  Colors<kBlock> own_radiance;
+  std::array<float, kBlock> own_density;
+  std::array<std::size_t, kBlock> place_of_own;
 
-  // Draw.
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const Path& path = paths_[at.path[i]];
-    const Rng rng = random_of(path);
-    const std::uint32_t step = step_at(bounce, path.number);
-    const Philox4x32::Counter bits = rng.bits(step, kChoose);
-    choice[i] = uniform_float(bits[1]);
-    const PresampledLight::Block& block =
-        starts_[path.start].presampled->blocks[bits[0] % PresampledLight::kNumBlocks];
+  /// Those of surface i, the next one. u: of the BRDF.
+  void add(const SiteBlock& sites, std::size_t i, const PresampledLight::Block& block,
+           const std::array<float, 2>& u) {
     for (std::size_t c = 0; c < kFromLight; ++c) {
-      const std::size_t n = from_light.count++;
-      from_light.site[n] = static_cast<std::int32_t>(i);
-      from_light.direction.x[n] = block.x[c];
-      from_light.direction.y[n] = block.y[c];
-      from_light.direction.z[n] = block.z[c];
+      const std::size_t n = from_light.count;
       radiance.r[n] = block.r[c];
       radiance.g[n] = block.g[c];
       radiance.b[n] = block.b[c];
       density[n] = block.density[c];
+      from_light.add(i, {block.x[c], block.y[c], block.z[c]});
     }
-    if (at.sites.specular_probability[i] > 0)
-      own.add(i, uniform_float(bits[2]), uniform_float(bits[3]));
+    if (!(sites.specular_probability[i] > 0)) return;
+    place_of_own[i] = own.count;
+    own.add(i, u[0], u[1]);
   }
-
-  // Evaluate.
-  from_light.evaluate(at.sites);
-  Colors<kBlock> own_radiance;
-  std::array<float, kBlock> own_density;
-  if (own.count > 0) {
-    own.draw(at.sites);
-    own.evaluate(at.sites);
+  void evaluate(const SiteBlock& sites, const EnvironmentView& light) {
+    from_light.evaluate(sites);
+    if (own.count == 0) return;
+    own.draw(sites);
+    own.evaluate(sites);
     kernels::evaluate_environment(light, own.used(own.direction.x), own.used(own.direction.y),
                                   own.used(own.direction.z), own.used(own_radiance.r),
                                   own.used(own_radiance.g), own.used(own_radiance.b),
                                   own.used(own_density));
   }
-
-  // Choose.
-  std::size_t next_own = 0;
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const bool is_glossy = at.sites.specular_probability[i] > 0;
-    std::array<Candidate, kFromLight + 1> candidates;
-    float total = 0;
+  /// After evaluate.
+  OfSurface of(const SiteBlock& sites, std::size_t i) const {
+    OfSurface all;
+    const bool is_glossy = sites.specular_probability[i] > 0;
     for (std::size_t c = 0; c < kFromLight; ++c) {
       const std::size_t n = i * kFromLight + c;
-      candidates[c] = candidate(from_light.direction[n], from_light.reflected[n], radiance[n],
-                                density[n], is_glossy ? from_light.density[n] : 0);
-      total += candidates[c].weight;
+      all[c] = candidate(from_light.direction[n], from_light.reflected[n], radiance[n], density[n],
+                         is_glossy ? from_light.density[n] : 0);
     }
-    if (is_glossy) {
-      const std::size_t n = next_own++;
-      candidates[kFromLight] = candidate(own.direction[n], own.reflected[n], own_radiance[n],
-                                         own_density[n], own.density[n]);
-      total += candidates[kFromLight].weight;
-    }
-    if (!(total > 0) || !std::isfinite(total)) continue;
+    if (!is_glossy) return all;
+    const std::size_t n = place_of_own[i];
+    all[kFromLight] = candidate(own.direction[n], own.reflected[n], own_radiance[n], own_density[n],
+                                own.density[n]);
+    return all;
+  }
+};
+
+}  // namespace
+
+/// Shadow rays to some of the light.
+void BounceWalk::light_up(const Surfaces& at, std::int32_t bounce, const EnvironmentView& light) {
+  if (starts_[paths_[at.path[0]].start].presampled->empty()) return;  // a black map
+  LightCandidates candidates;
+  std::array<float, kBlock> choice;
+  for (std::size_t i = 0; i < at.count; ++i) {
     const Path& path = paths_[at.path[i]];
-    float passed = candidates[0].weight;
-    for (std::size_t ray = 0, c = 0; ray < kRays; ++ray) {
-      const float place = (static_cast<float>(ray) + choice[i]) / static_cast<float>(kRays) * total;
-      while (passed <= place && c < kFromLight) passed += candidates[++c].weight;
-      const Candidate& chosen = candidates[c];
-      if (!(chosen.weight > 0)) continue;  // rounding, at the end of the line
-      shadows_.push(hits_[at.path[i]].ray_origin, chosen.direction);
-      values_.push_back(path.throughput * chosen.value *
-                        (total / (chosen.weight * static_cast<float>(kRays))));
-      firsts_lit_.push_back(path.first);
-    }
+    const Philox4x32::Counter bits = random_of(path).bits(step_at(bounce, path.number), kChoose);
+    choice[i] = uniform_float(bits[1]);
+    candidates.add(at.sites, i,
+                   starts_[path.start].presampled->blocks[bits[0] % PresampledLight::kNumBlocks],
+                   {uniform_float(bits[2]), uniform_float(bits[3])});
+  }
+  candidates.evaluate(at.sites, light);
+  for (std::size_t i = 0; i < at.count; ++i)
+    keep_some(at, i, candidates.of(at.sites, i), choice[i]);
+}
+
+/// Traces some candidates of surface i, drawn systematically in proportion to what they bring. u:
+/// uniform in [0, 1).
+void BounceWalk::keep_some(const Surfaces& at, std::size_t i, std::span<const Candidate> candidates,
+                           float u) {
+  float total = 0;
+  for (const Candidate& one : candidates) total += one.weight;
+  if (!(total > 0) || !std::isfinite(total)) return;
+  const Path& path = paths_[at.path[i]];
+  const bool is_shared = at.is_shared(i);
+  const bool is_member = is_shared && firsts_[path.first].kind == Kind::member;
+  const int num_rays = is_member ? limits::kSharedBounceRays : limits::kBounceRays;
+  const float share = total / static_cast<float>(num_rays);
+  float passed = candidates[0].weight;
+  std::size_t c = 0;
+  for (int ray = 0; ray < num_rays; ++ray) {
+    const float place = (static_cast<float>(ray) + u) * share;
+    while (passed <= place && c + 1 < candidates.size()) passed += candidates[++c].weight;
+    const Candidate& chosen = candidates[c];
+    if (!(chosen.weight > 0)) continue;  // rounding, at the end of the line
+    shadows_.push(hits_[at.path[i]].ray_origin, chosen.direction);
+    const float scale = share / chosen.weight;
+    const Rgb alike =
+        is_shared ? at.reflected_alike(i, chosen.direction) * chosen.arriving : chosen.value;
+    lit_.push_back({.first = path.first,
+                    .radiance = path.throughput * chosen.value * scale,
+                    .shared = path.shared * alike * scale});
   }
 }
 
@@ -491,11 +601,17 @@ void BounceWalk::go_on(const Surfaces& at, std::int32_t bounce) {
     const Path& path = paths_[at.path[i]];
     const float pdf = on.density[i];
     Rgb throughput = path.throughput * on.reflected[i] / pdf;
+    Rgb shared = path.shared *
+                 (at.is_shared(i) ? at.reflected_alike(i, on.direction[i]) : on.reflected[i]) / pdf;
     const float kept = std::max({throughput.x, throughput.y, throughput.z}) / kSurelyKept;
     if (!(pdf > 0) || !(survival[i] < kept)) continue;
-    if (kept < 1) throughput = throughput / kept;
+    if (kept < 1) {
+      throughput = throughput / kept;
+      shared = shared / kept;
+    }
     next_.push_back({.ray = {hits_[at.path[i]].ray_origin, on.direction[i]},
                      .throughput = throughput,
+                     .shared = shared,
                      .width = path.width,
                      .spread = path.spread + kConeShare / std::sqrt(pdf),
                      .least_pdf = std::min(path.least_pdf, pdf),

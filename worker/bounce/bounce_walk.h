@@ -13,6 +13,8 @@
 
 namespace baton {
 
+struct BounceCandidate;
+
 /// Pixels that share what their paths find: a square of 4 x 4 in a block of the picture, which goes
 /// on at the block's other edges and lies elsewhere in each round.
 struct BounceGroup {
@@ -53,23 +55,22 @@ struct BounceStart {
 /// (balance heuristic); it adds what it emits; and under Russian roulette the path goes on. What
 /// misses all surfaces adds nothing: the method has counted it.
 ///
-/// Pixels that see matt surfaces share what they find: 16 of a block of the picture, in each round
-/// others (BounceGroup), draw from one sequence. The light of a matt surface that one of them has
-/// met is handed to all that see it, in proportion to the density with which each would have met it
-/// (balance heuristic over the traced visibilities). So the pixels of a group are in one walk.
+/// Pixels share what they find: 16 of a block of the picture, in each round others (BounceGroup),
+/// draw from one sequence. What a surface that one of them has met reflects alike to all sides is
+/// handed to all that see it, in proportion to the density with which each would have met it
+/// (balance heuristic over the traced visibilities); the rest goes to the one that has met it, for
+/// which a pixel has more paths where the scene has metal. So the pixels of a group are in one
+/// walk. Where the sites of a pixel reflect sharply, so that others meet nothing for it, its paths
+/// are its own.
 ///
 /// Unbiased, unless glossy surfaces behind rough ones are made rougher (LightSpec::filter_glossy).
 class BounceWalk {
  public:
-  /// Paths of a pixel and round, of one that shares, and shadow rays of each surface that they
-  /// meet.
   static constexpr std::uint32_t kPaths = limits::kBouncePaths,
-                                 kSharedPaths = limits::kSharedBouncePaths,
-                                 kRays = limits::kBounceRays;
+                                 kSharedPaths = limits::kSharedBouncePaths;
 
   /// spec.bounces > 0. geometry: of the frame, must outlive the object.
-  BounceWalk(const LightSpec& spec, const FrameGeometry& geometry)
-      : spec_(spec), geometry_(geometry) {}
+  BounceWalk(const LightSpec& spec, const FrameGeometry& geometry);
 
   /// Starts the paths of pixel `pixel` of a walk.
   void add(std::uint32_t pixel, const BounceStart& start);
@@ -86,23 +87,26 @@ class BounceWalk {
     const PresampledLight* presampled;
     RngKey key;
   };
+  /// What the first piece of a path brings: all that comes along it; that but for what is shared,
+  /// which is handed out in an exchange; or only the rest.
+  enum class Kind : std::uint8_t { alone, member, rest };
   /// The first piece of a path, and what comes along it.
   struct First {
     std::uint32_t pixel;  ///< of the walk
     /// Light of the pixel per radiance.
     Rgb weight;
-    bool is_member;  ///< of an exchange
+    Kind kind;
     Rgb radiance{};
-    /// The surface that it has met, if it looks the same to all: where rays from it start, and its
-    /// geometric normal.
-    bool is_shared = false;
+    /// Part of it that the surface at the end sends alike to all sides. Where rays from that start,
+    /// and its geometric normal.
+    Rgb shared{};
     Vec3 origin{}, ng{};
   };
   /// A path on its way to the next surface.
   struct Path {
     Ray ray;
-    /// Radiance of its first piece per radiance along the ray.
-    Rgb throughput;
+    /// Radiance of its first piece, and the part of it that is shared, per radiance along the ray.
+    Rgb throughput, shared;
     /// Of the cone that textures are averaged over: its width at the origin, and its growth per
     /// distance.
     float width = 0, spread = 0;
@@ -112,10 +116,14 @@ class BounceWalk {
     std::uint32_t number = 0;  ///< of the path in its pixel
     std::uint32_t start = 0;   ///< index into starts_
   };
-  /// A matt surface that takes part in an exchange.
+  /// A shadow ray's light.
+  struct Lit {
+    std::uint32_t first;  ///< index into firsts_
+    Rgb radiance, shared;
+  };
+  /// A surface that takes part in an exchange.
   struct Member {
-    Vec3 origin, ns, ng;
-    Rgb weight;           ///< albedo, as a share of the pixel's light
+    Vec3 origin;
     std::uint32_t pixel;  ///< of the walk
     std::int32_t first;   ///< index of its path, or -1: it has none
   };
@@ -125,33 +133,37 @@ class BounceWalk {
     std::uint32_t path;
     bool is_aside;
     std::vector<Member> members;
+    SiteBlock sites;  ///< what members see
   };
   struct Surfaces;
 
-  void add_alone(std::uint32_t pixel, const BounceStart& start);
+  void add_own(std::uint32_t pixel, const BounceStart& start, std::uint32_t first_path, Kind kind);
   void add_member(std::uint32_t pixel, const BounceStart& start);
   void push_path(std::uint32_t pixel, const SurfaceHit& hit, const Vec3& direction, float pdf,
-                 std::uint32_t number, const Rgb& weight, bool is_member);
-  std::vector<Member>& exchange_of(const BounceStart& start, std::uint32_t path);
+                 std::uint32_t number, const Rgb& weight, Kind kind);
+  bool is_wanted(std::size_t path, std::int32_t bounce) const;
+  Exchange& exchange_of(const BounceStart& start, std::uint32_t path);
   void shade(std::span<const std::size_t> met, std::int32_t bounce, const EnvironmentView& light);
   void light_up(const Surfaces& at, std::int32_t bounce, const EnvironmentView& light);
+  void keep_some(const Surfaces& at, std::size_t i, std::span<const BounceCandidate> candidates,
+                 float u);
   void go_on(const Surfaces& at, std::int32_t bounce);
-  void share(std::span<const Member> members, std::span<Rgb> found);
+  void share(const Exchange& exchange, std::span<Rgb> found);
   Rng random_of(const Path& path) const;
 
   const LightSpec& spec_;
+  bool has_metal_ = false;  ///< much is reflected otherwise than alike
   const FrameGeometry& geometry_;
   std::vector<Start> starts_;
   std::vector<First> firsts_;
   std::vector<Path> paths_, next_;
-  std::vector<Exchange> exchanges_;  ///< the first num_exchanges_; the others are memory
+  /// The first num_exchanges_; the others are memory.
+  std::vector<Exchange> exchanges_;
   std::size_t num_exchanges_ = 0;
   std::vector<Ray> rays_;
   std::vector<SurfaceHit> hits_;
   ShadowRays shadows_;
-  std::vector<Rgb> values_;                ///< (shadows_) what each adds if it is free
-  std::vector<std::uint32_t> firsts_lit_;  ///< (shadows_) to whose radiance
-  std::vector<float> densities_;           ///< of an exchange, (surfaces x members)
+  std::vector<Lit> lit_;  ///< (shadows_) what each adds if it is free
   std::uint64_t num_rays_ = 0;
 };
 

@@ -12,6 +12,17 @@ Rgb source_color(PixelSource source) {
   return kColors.at(static_cast<std::size_t>(source));
 }
 
+namespace {
+
+/// A picture beside the picture: what it would be, or a part of it.
+Rgb part_of_picture(Aov aov, const PixelResult& pixel) {
+  if (aov == Aov::unshadowed) return pixel.radiance + pixel.blocked;
+  if (aov == Aov::blocked) return pixel.blocked;
+  return aov == Aov::indirect ? pixel.indirect : pixel.radiance - pixel.indirect;
+}
+
+}  // namespace
+
 FilmWriter::FilmWriter(const PixelRect& rect, const JobSpec& job)
     : aovs_(job.output.aovs), with_shadow_(has_catcher(job)), with_error_(tells_noise(job)) {
   film_.rect = rect;
@@ -82,16 +93,10 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         put(pixel.rounds);
         break;
       case Aov::unshadowed:
-        put_vec(pixel.radiance + pixel.blocked);
-        break;
       case Aov::blocked:
-        put_vec(pixel.blocked);
-        break;
       case Aov::direct:
-        put_vec(pixel.radiance - pixel.indirect);
-        break;
       case Aov::indirect:
-        put_vec(pixel.indirect);
+        put_vec(part_of_picture(aov, pixel));
         break;
       case Aov::albedo:
       case Aov::position:

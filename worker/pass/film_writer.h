@@ -38,7 +38,8 @@ struct PixelResult {
   Rgb variance{};
   /// Light that shadows take away: `radiance` without them is the sum.
   Rgb blocked{};
-  Rgb indirect{};            ///< part of `radiance` that came by other surfaces
+  /// Part of `radiance` that came by other surfaces.
+  Rgb indirect{};
   float error = kNoSurface;  ///< as in the plane kErrorChannel
   float rounds = 1;          ///< number of rounds in this mean
   /// Share of the light that arrives on the catcher, times `catcher`.

@@ -1,7 +1,9 @@
 #include "worker/run/worker.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <array>
@@ -16,6 +18,7 @@
 #include <thread>
 
 #include "common/base/build.h"
+#include "common/base/file_descriptor.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/base/log.h"
@@ -55,13 +58,17 @@ std::string name_of_worker(const WorkerOptions& options) {
                                    : options.worker_id;
 }
 
-SessionOptions session_options(const WorkerOptions& options) {
+/// Tells processes of one name apart. Host and process id do not tell containers apart.
+std::uint64_t draw_instance() {
+  std::random_device random;
+  return std::uint64_t{random()} << 32 | random();
+}
+
+SessionOptions session_options(const WorkerOptions& options, std::uint64_t instance) {
   WorkerHello identity;
   identity.host = host_name();
   identity.pid = static_cast<std::int32_t>(::getpid());
-  // Host and process id do not tell containers apart.
-  std::random_device random;
-  identity.instance = std::uint64_t{random()} << 32 | random();
+  identity.instance = instance;
   identity.worker_id = name_of_worker(options);
   identity.num_threads = options.num_threads;
   identity.build = build_identity();
@@ -221,7 +228,7 @@ class Worker {
  public:
   Worker(WorkerChannel channel, const WorkerOptions& options)
       : channel_(std::move(channel)),
-        session_(session_options(options), now()),
+        session_(session_options(options, instance_), now()),
         worker_id_(name_of_worker(options)),
         machine_(options.machine),
         jobs_(
@@ -356,13 +363,27 @@ class Worker {
     store_directory_ = action.directory;
     store_ = std::make_shared<BlobStore>(std::move(store).value());
     if (!std::exchange(logs_to_file_, true)) {
-      const std::filesystem::path file = worker_log(folder.parent_path(), worker_id_);
+      const std::filesystem::path file = own_log(folder.parent_path());
       if (const Status opened = log_to_file(file); !opened)
         spdlog::warn("no log for `baton job log`: {}", opened.error().message);
       if (const Status opened = trace_to_file(trace_beside(file), worker_id_); !opened)
         spdlog::warn("no trace for `baton job trace`: {}", opened.error().message);
     }
     spdlog::info("the coordinator has answered, blobs are in {}", folder.string());
+  }
+  /// The log of its name; where another process writes that, one of its own, named as the
+  /// coordinator tells the two apart.
+  std::filesystem::path own_log(const std::filesystem::path& work_folder) {
+    const std::filesystem::path file = worker_log(work_folder, worker_id_);
+    std::error_code error;
+    std::filesystem::create_directories(file.parent_path(), error);
+    const std::filesystem::path lock = file.parent_path() / ("." + file.stem().string() + ".lock");
+    log_lock_ = FileDescriptor(
+        ::open(lock.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR));
+    if (!log_lock_ || ::flock(log_lock_.number(), LOCK_EX | LOCK_NB) == 0) return file;
+    const std::string id =
+        fmt::format("{}#{:08x}", worker_id_, static_cast<std::uint32_t>(instance_));
+    return worker_log(work_folder, id);
   }
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.grant.lease.job);
@@ -432,8 +453,10 @@ class Worker {
   }
 
   WorkerChannel channel_;
+  const std::uint64_t instance_ = draw_instance();
   Session session_;
   const std::string worker_id_;
+  FileDescriptor log_lock_{-1};
   const Machine machine_;
   AssetShelf shelf_;  ///< what jobs_ loads from
   JobCache jobs_;

@@ -19,25 +19,52 @@ void SiteBlock::clear(int sites) {
   any_coat = false;
 }
 
+namespace {
+
+/// All that a site has, without its coat.
+constexpr SiteBlock::Array SiteBlock::*kOfSite[] = {
+    &SiteBlock::ns_x,     &SiteBlock::ns_y,        &SiteBlock::ns_z,
+    &SiteBlock::ng_x,     &SiteBlock::ng_y,        &SiteBlock::ng_z,
+    &SiteBlock::wo_x,     &SiteBlock::wo_y,        &SiteBlock::wo_z,
+    &SiteBlock::mirror_x, &SiteBlock::mirror_y,    &SiteBlock::mirror_z,
+    &SiteBlock::kd_r,     &SiteBlock::kd_g,        &SiteBlock::kd_b,
+    &SiteBlock::ks_r,     &SiteBlock::ks_g,        &SiteBlock::ks_b,
+    &SiteBlock::shape,    &SiteBlock::lobe_scale,  &SiteBlock::specular_probability,
+    &SiteBlock::alpha2,   &SiteBlock::view_cosine, &SiteBlock::view_masking,
+    &SiteBlock::is_ggx};
+constexpr SiteBlock::Array SiteBlock::Coats::*kOfCoat[] = {
+    &SiteBlock::Coats::ns_x,  &SiteBlock::Coats::ns_y,  &SiteBlock::Coats::ns_z,
+    &SiteBlock::Coats::wo_x,  &SiteBlock::Coats::wo_y,  &SiteBlock::Coats::wo_z,
+    &SiteBlock::Coats::alpha, &SiteBlock::Coats::share, &SiteBlock::Coats::chance};
+
+}  // namespace
+
 void SiteBlock::Coats::clear(int sites) {
-  for (Array* const array : {&ns_x, &ns_y, &ns_z, &wo_x, &wo_y, &wo_z, &alpha, &share, &chance})
-    std::fill_n(array->begin(), sites, 0.0f);
+  for (const auto array : kOfCoat) std::fill_n((this->*array).begin(), sites, 0.0f);
 }
 
 void SiteBlock::add_miss(int site) {
   const auto s = static_cast<std::size_t>(site);
-  for (Array* array : {&ns_x,     &ns_y,        &ns_z,
-                       &ng_x,     &ng_y,        &ng_z,
-                       &wo_x,     &wo_y,        &wo_z,
-                       &mirror_x, &mirror_y,    &mirror_z,
-                       &kd_r,     &kd_g,        &kd_b,
-                       &ks_r,     &ks_g,        &ks_b,
-                       &shape,    &lobe_scale,  &specular_probability,
-                       &alpha2,   &view_cosine, &view_masking,
-                       &is_ggx}) {
-    (*array)[s] = 0;
-  }
+  for (const auto array : kOfSite) (this->*array)[s] = 0;
   measured[s] = nullptr;
+}
+
+void SiteBlock::add_copy(int site, const SiteBlock& from, int other) {
+  BATON_CHECK(site >= 0 && site < num_sites && num_hits < kMaxSites);
+  const auto s = static_cast<std::size_t>(site), o = static_cast<std::size_t>(other);
+  for (const auto array : kOfSite) (this->*array)[s] = (from.*array)[o];
+  measured[s] = from.measured[o];
+  any_phong = any_phong || from.any_phong;
+  any_ggx = any_ggx || from.any_ggx;
+  any_measured = any_measured || from.any_measured;
+  if (from.any_coat) {
+    if (!any_coat) coats.clear(num_sites);
+    any_coat = true;
+    for (const auto array : kOfCoat) (coats.*array)[s] = (from.coats.*array)[o];
+  }
+  specular_sum += specular_probability[s];
+  hit_sites[static_cast<std::size_t>(num_hits++)] = site;
+  if (specular_probability[s] > 0) lobe_sites[static_cast<std::size_t>(num_lobes++)] = site;
 }
 
 void SiteBlock::add(int site, const ShadingPoint& point, const Material& material) {

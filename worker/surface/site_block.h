@@ -68,6 +68,8 @@ struct alignas(64) SiteBlock {
   void clear(int sites);
   /// Sets site `site` to a surface.
   void add(int site, const ShadingPoint& point, const Material& material);
+  /// Sets site `site` to what site `other` of another block is, a surface.
+  void add_copy(int site, const SiteBlock& from, int other);
   /// Sets site `site` to nothing.
   void add_miss(int site);
 

@@ -58,7 +58,7 @@ std::vector<ListedJob> chosen(const ListOptions& options, std::int64_t since_ms,
   std::erase_if(jobs, [&](const ListedJob& job) {
     return (!options.owner.empty() && job.summary.owner != options.owner) ||
            (!options.activity.empty() && job_activity_name(job.now.activity) != options.activity) ||
-           job.identity.times.submitted_ms < since_ms;
+           (job.identity.times.ended_ms != 0 && job.identity.times.ended_ms < since_ms);
   });
   std::ranges::stable_sort(jobs, orders().at(options.sort));
   return jobs;
@@ -104,7 +104,7 @@ void add_list_command(CLI::App& job, ExitCode& code) {
   lists->add_option("--status", options->activity, "only those that are so")
       ->check(CLI::IsMember(activities()));
   lists->add_option("--since", options->since,
-                    "first submitted 30s, 15m, 2h or 3d ago, or at a time in UTC, or later");
+                    "open, or ended 30s, 15m, 2h or 3d ago, or at a time in UTC, or later");
   std::vector<std::string> keys;
   for (const auto& [key, order] : orders()) keys.push_back(key);
   lists->add_option("--sort", options->sort, "by what; priority: the highest first")

@@ -105,5 +105,24 @@ TEST(StoreRoom, ARunIsBegunWhenAllOfItFits) {
   EXPECT_TRUE(has_room(room, fresh, others, first, false));
 }
 
+// A task makes 40 bytes. An eighth of 80 is 10.
+TEST(StoreRoom, ARunThatWasBegunEndsThoughItsTilesAreLarger) {
+  const JobSpec spec = small_job(2, 4, 2);
+  const JobGraph graph(spec);
+  const TaskBook book(graph);
+  BlobSizes sizes(spec);
+  sizes.learn({{BlobKind::film, 0, 0, {}, 10}, {BlobKind::state, 1, 0, {}, 20}});
+  const TaskIndex task = *graph.find(render(0, 0));
+  const JobInStore fresh{graph, book, sizes, baton::Run(0)};
+  const JobInStore begun{graph, book, sizes, baton::Run(1)};
+  StoreRoom room{.limit = 80, .used = 50, .is_idle = true};
+  EXPECT_TRUE(has_room(room, begun, {}, task, false));
+  EXPECT_FALSE(has_room(room, fresh, {}, task, false)) << "nothing new is begun so";
+  room.is_idle = false;
+  EXPECT_FALSE(has_room(room, begun, {}, task, false)) << "who works may make room";
+  room = {.limit = 80, .used = 51, .is_idle = true};
+  EXPECT_FALSE(has_room(room, begun, {}, task, false)) << "more than an eighth";
+}
+
 }  // namespace
 }  // namespace baton

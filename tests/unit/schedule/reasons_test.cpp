@@ -180,6 +180,8 @@ TEST(Reasons, WorkersRenderOtherwiseHaveFailedOrAreDraining) {
   chain = farm.why();
   ASSERT_THAT(kinds(chain), ElementsAre(ReasonKind::tried));
   EXPECT_THAT(chain[0].workers, ElementsAre("c"));
+  EXPECT_EQ(chain[0].count, 1u);
+  EXPECT_FALSE(chain[0].text.empty()) << "what it said";
 }
 
 TEST(Reasons, FramesFarAheadComeLater) {

@@ -28,6 +28,24 @@ TEST(JobReport, AFailureIsToldWithTheFramesOfItsTask) {
             "frame 1003, tile 0, second pass on w: boom");
 }
 
+// A cause is told once, however many tasks it hits.
+TEST(JobReport, FailuresOfOneCauseAreOneLine) {
+  Farm farm(small_job(3, 2, 2));
+  farm.submit();
+  std::vector<Failure> failures;
+  for (int tile = 0; tile < 3; ++tile) {
+    const std::string message = "no such folder\nto replay it alone: tile " + std::to_string(tile);
+    failures.push_back({{farm.job, render(0, tile), 1, 1}, "w", message});
+  }
+  failures.insert(failures.begin() + 1, {{farm.job, render(0, 0), 2, 1}, "v", "no such folder"});
+  failures.push_back({{farm.job, assemble(0), 1, 1}, "w", "disk full"});
+  EXPECT_THAT(describe_job(farm.scheduler, farm.job, failures).failures,
+              testing::ElementsAre("frames 1-2, tile 0 on v: no such folder",
+                                   "3 failures, the last frames 1-2, tile 2 on w: no such folder\n"
+                                   "to replay it alone: tile 2",
+                                   "frame 1 on w: disk full"));
+}
+
 // Runs 0 and 1 are the first sweep, 2 and 3 the second.
 TEST(JobReport, ATaskOfALaterSweepStandsAtTheSameFrames) {
   const JobSpec job = with_sweeps(small_job(2, 4, 2), 3);

@@ -131,6 +131,24 @@ TEST_F(HistoryTest, WhatHappensIsToldOnce) {
   EXPECT_THAT(show_identity(again.endpoint(), id.hex()).times.ended_ms, Gt(0));
 }
 
+// To lock and unlock a frame of a job that is done changes nothing of what happened.
+TEST_F(HistoryTest, AnUnlockedFrameSubmitsNothing) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  const JobAccepted accepted = submit(service.endpoint(), job);
+  const std::string id = accepted.identity.id.hex();
+  finish_all(service.endpoint(), worker, accepted.version);
+  const JobTimes before = show_identity(service.endpoint(), id).times;
+  for (const bool off : {false, true})
+    ask<ShownJob>(service.endpoint(), LockFrames{id, {FrameNumber(1)}, off});
+  const std::vector<FarmEvent> told = events(service.endpoint(), id);
+  EXPECT_EQ(count(told, FarmEventKind::job_submitted), 1u);
+  EXPECT_EQ(count(told, FarmEventKind::job_done), 1u);
+  EXPECT_EQ(told.back().kind, FarmEventKind::frames_unlocked);
+  EXPECT_EQ(show_identity(service.endpoint(), id).times, before);
+}
+
 TEST_F(HistoryTest, AWorkerThatWasToldToFinishIsShownSo) {
   const RunningService service(options);
   FakeWorker worker(service.endpoint(), store(), job);

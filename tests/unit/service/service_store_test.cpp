@@ -132,5 +132,29 @@ TEST_F(ServiceStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
   EXPECT_FALSE(show(service.endpoint(), second).lacks_room);
 }
 
+// Nobody could ask for it by a name. What the newest version of an ended job left stays.
+TEST_F(ServiceStoreTest, WhatAnEarlierVersionLeftGoesWhereThereIsNoRoom) {
+  options.store_limit = 45;
+  const RunningService service(options);
+  const Digest first = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  for (int i = 0; i < 2; ++i) worker.do_one_task();
+  worker.say(Heartbeat{});
+  worker.expect<Heartbeat>();
+  ask<ShownJob>(service.endpoint(), CancelJob{first.hex()});
+  ++job.seed;
+  const Digest second =
+      ask<JobAccepted>(service.endpoint(),
+                       SubmitJob{make_job_document(job).value(), /*restart=*/true})
+          .version;
+  worker.do_one_task();
+  worker.say(LeaseRequest{1});
+  worker.expect<NoWork>();
+  EXPECT_EQ(worker.expect<LeaseGrant>().lease.job, second);
+  const JobDetail detail = show(service.endpoint(), second);
+  EXPECT_FALSE(detail.lacks_room);
+}
+
 }  // namespace
 }  // namespace baton
