@@ -76,20 +76,23 @@ double furnace_light(double open, double albedo, int bounces) {
 std::vector<double> indirect(const FilmTile& film) { return test::mean_rgb(film, "indirect"); }
 
 // H0: the mean is the closed form. |z| < 3.5: level 5e-4 for each number of bounces. Seeds 1 to
-// 12. What is resolved, 3.9 standard errors, is below 1 %.
-TEST(Bounces, FurnaceHasItsClosedForm) {
+// `runs`. What is resolved are 3.9 standard errors.
+void expect_closed_form(int runs, double max_resolution) {
   constexpr double kOpen = 0.5, kAlbedo = 0.8;
   for (const int bounces : {1, 3, 12}) {
     const double truth = furnace_light(kOpen, kAlbedo, bounces);
     const Estimate seen =
-        test::repeat(furnace(kOpen, static_cast<float>(kAlbedo), bounces, 16), 12, indirect);
+        test::repeat(furnace(kOpen, static_cast<float>(kAlbedo), bounces, 16), runs, indirect);
     const double error = std::sqrt(seen.image_variance);
     EXPECT_LT(std::fabs(seen.image_mean - truth) / error, 3.5) << bounces << " bounces";
-    EXPECT_LT(test::kResolvedErrors * error / truth, 0.01);
+    EXPECT_LT(test::kResolvedErrors * error / truth, max_resolution);
     std::printf("  %d bounces: %+.3f %% (%.3f)\n", bounces, 100 * (seen.image_mean / truth - 1),
                 100 * error / truth);
   }
 }
+
+TEST(Bounces, FurnaceHasItsClosedForm) { expect_closed_form(12, 0.01); }
+TEST(Bounces, FurnaceHasItsClosedFormInTheLongRun) { expect_closed_form(600, 0.0012); }
 
 /// Paths of cosine- and lobe-sampled directions, which add what they find where they leave the
 /// scene and what glows on the way: what is seen directly left out.
@@ -183,9 +186,10 @@ JobSpec room(Method method, int bounces) {
 }
 
 // H0: pixels and the image's mean are those of the path tracer; levels as for all methods
-// (against_brute_force.h). Seeds 1 to 48.
-void expect_same_as_paths(const JobSpec& job, double max_resolution) {
-  const Estimate truth = PathTracer(job).render(40000), seen = test::repeat(job, 48, indirect);
+// (against_brute_force.h). Seeds 1 to 48 times `longer`.
+void expect_same_as_paths(const JobSpec& job, double max_resolution, int longer = 1) {
+  const Estimate truth = PathTracer(job).render(longer * 40000),
+                 seen = test::repeat(job, longer * 48, indirect);
   const test::Verdict v = test::compare(seen, truth);
   EXPECT_LT(v.worst_pixel, test::kPixelLimit);
   EXPECT_LT(v.image, test::kImageLimit);
@@ -195,18 +199,25 @@ void expect_same_as_paths(const JobSpec& job, double max_resolution) {
               100 * v.resolution);
 }
 
-TEST(Bounces, RoomAgreesWithPaths) {
-  for (const int bounces : {1, 2, 5}) expect_same_as_paths(room(Method::pool, bounces), 0.035);
-}
-TEST(Bounces, CoatsAgreeWithPaths) {
-  JobSpec job = room(Method::pool, 2);
+/// The room with a lacquered floor and a wall that glows.
+JobSpec lacquered_room(Method method) {
+  JobSpec job = room(method, 2);
   job.scene.materials["ground"] = {.kind = MaterialKind::metallic_roughness,
                                    .base_color = {0.4f, 0.4f, 0.3f},
                                    .roughness = 0.6f,
                                    .clearcoat = 1.0f,
                                    .clearcoat_roughness = 0.5f};
   job.scene.materials["green"].emission = {0, 0.5f, 0.1f};
-  expect_same_as_paths(job, 0.035);
+  return job;
+}
+
+TEST(Bounces, RoomAgreesWithPaths) {
+  for (const int bounces : {1, 2, 5}) expect_same_as_paths(room(Method::pool, bounces), 0.035);
+}
+TEST(Bounces, CoatsAgreeWithPaths) { expect_same_as_paths(lacquered_room(Method::pool), 0.035); }
+TEST(Bounces, RoomsAgreeWithPathsInTheLongRun) {
+  expect_same_as_paths(room(Method::bidirectional, 2), 0.006, 16);
+  expect_same_as_paths(lacquered_room(Method::bidirectional), 0.006, 16);
 }
 
 }  // namespace
