@@ -29,7 +29,7 @@ SPP = 24
 def render(scene, folder):
     """Each frame with each seed."""
     for seed in SEEDS:
-        cycles_settings.set_direct_light(scene, argparse.Namespace(spp=SPP, seed=seed, threads=2))
+        cycles_settings.set_light(scene, argparse.Namespace(spp=SPP, seed=seed, threads=2))
         scene.cycles.use_animated_seed = True
         for frame in range(scene.frame_start, scene.frame_end + 1):
             scene.frame_set(frame)

@@ -27,7 +27,7 @@ def main():
     parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
     scene = bpy.context.scene
-    cycles_settings.set_direct_light(scene, options)
+    cycles_settings.set_light(scene, options)
     scene.cycles.use_animated_seed = True
     for frame in keys.parse_frames(options.frames):
         scene.frame_set(frame)

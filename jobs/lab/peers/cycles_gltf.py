@@ -134,7 +134,7 @@ def main():
     cycles_scene.set_picture(scene, {"width": options.width, "height": options.height})
     if options.catcher:
         catch(scene, options.catcher, options.unblocked)
-    cycles_settings.set_direct_light(scene, options)
+    cycles_settings.set_light(scene, options)
     sky = cycles_scene.Sky(scene, options.map.parent, {"maps": [options.map.name], "bilinear": True}, None)
     sky.show({"map": 0, "rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1]})
     # The importer makes x, -z, y of x, y, z; conventions.py has z, x, y.

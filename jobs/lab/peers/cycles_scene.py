@@ -215,7 +215,7 @@ def main():
             collection.remove(item)
     scene = bpy.context.scene
     set_picture(scene, placed)
-    cycles_settings.set_direct_light(scene, options)
+    cycles_settings.set_light(scene, options, placed["bounces"])
     objects = make_objects(scene, options.placed, placed)
     sky, camera = Sky(scene, options.placed, placed, options.fault), make_camera(scene)
 

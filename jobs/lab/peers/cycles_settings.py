@@ -1,9 +1,9 @@
 """Settings of Cycles for what Baton renders; runs inside Blender 3.4."""
 
 
-def set_direct_light(scene, options):
-    """Cycles as its defaults are, but for what would not be direct light or fixed samples, with float frames. options:
-    spp, seed, threads."""
+def set_light(scene, options, bounces=0):
+    """Cycles as its defaults are, but for what would not be light by so many surfaces beside the one that is seen, or fixed
+    samples, with float frames. options: spp, seed, threads."""
     cycles, render = scene.cycles, scene.render
     render.engine, cycles.device = "CYCLES", "CPU"
     render.threads_mode, render.threads = "FIXED", options.threads
@@ -11,9 +11,9 @@ def set_direct_light(scene, options):
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.time_limit = 0
 
-    # No light between surfaces: rays that leave the first surface count where they reach the map.
+    # With 0, rays that leave the first surface count where they reach the map.
     for name in ("max", "diffuse", "glossy", "transmission", "volume"):
-        setattr(cycles, f"{name}_bounces", 0)
+        setattr(cycles, f"{name}_bounces", bounces)
     # Holes are gone through.
     cycles.transparent_max_bounces = 64
     # Nothing that trades energy for less noise.

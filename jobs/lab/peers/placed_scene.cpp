@@ -218,6 +218,7 @@ Status place(const std::string& job_file, const fs::path& folder,
   std::ofstream(folder / "scene.json")
       << json{{"name", job.name},
               {"width", job.image.width},
+              {"bounces", job.light.bounces},
               {"height", job.image.height},
               {"bilinear", job.environment.filter == MapFilter::bilinear},
               {"moves", moves(job)},

@@ -18,7 +18,7 @@ HERE = Path(__file__).parent
 # Of every rendering of Baton: all its sites' noise is in the pairs, all its light in the files.
 FRAMES_AS_THEY_ARE = {"image.filter": "box", "output.aovs": "[]", "output.background": "environment",
                       "output.pixelType": "float", "output.compression": "none", "output.clampNegative": "false",
-                      "output.pattern": "frame.####.exr"}
+                      "output.pattern": "frame.####.exr", "light.filterGlossy": "false"}
 
 
 class Failed(Exception):
