@@ -20,6 +20,8 @@ class BlobSizes {
   std::uint64_t largest(const JobGraph& graph, const TaskKey& task) const;
   /// The same on average.
   std::uint64_t mean(const JobGraph& graph, const TaskKey& task) const;
+  /// What a state takes on average.
+  std::uint64_t mean_state() const { return of(BlobKind::state).sum / of(BlobKind::state).count; }
   /// What the largest state takes.
   std::uint64_t largest_state() const { return of(BlobKind::state).largest; }
   /// Whether nothing in these sizes of the task's outputs is estimated.

@@ -75,17 +75,16 @@ Cause running_of(const Lease& lease) {
 }
 
 std::string room_text(const Scheduler& scheduler, const Scheduler::Job& job) {
-  const JobGraph& graph = job.tasks.graph();
   const std::uint64_t ended = scheduler.kept_bytes();
   const auto open = std::ranges::count_if(scheduler.jobs(), [&](const Digest& digest) {
     return is_open(scheduler.find_job(digest)->status);
   });
   return fmt::format(
       "room in the store: it holds {} of the {} that --store-limit allows, {} of them of jobs that "
-      "have ended and the rest of {}, and the next task needs about {}: raise the limit{}",
+      "have ended and the rest of {}, and its next frames need about {}: raise the limit{}",
       bytes_text(scheduler.store_bytes()), bytes_text(scheduler.room().limit), bytes_text(ended),
       open == 1 ? "this one" : fmt::format("{} open ones", open),
-      bytes_text(job.sizes.largest(graph, graph.key(*job.tasks.book().ready().begin()))),
+      bytes_text(needed_bytes(job.in_store(), *job.tasks.book().ready().begin())),
       ended > 0 ? ", or delete ended jobs (`baton job list --all`)" : "");
 }
 
@@ -360,9 +359,14 @@ void Reasons::explain_free(const Digest& digest, const Scheduler::Job& job, Task
   } else {
     const StoreRoom room = scheduler_.room();
     cause.kind = ReasonKind::store;
-    cause.need_bytes = job.sizes.largest(graph, graph.key(task));
+    cause.need_bytes = needed_bytes(job.in_store(), task);
     const std::uint64_t taken = room.used + room.expected;
     cause.free_bytes = room.limit > taken ? room.limit - taken : 0;
+    for (const Digest& other : scheduler_.jobs()) {
+      const Scheduler::Job& holder = *scheduler_.find_job(other);
+      if (other != digest && holder.begun_runs > Run(0) && is_open(holder.status))
+        cause.jobs.push_back(other);
+    }
   }
   chain.push_back(std::move(cause));
 }

@@ -26,7 +26,8 @@ struct Cause {
   std::optional<TimePoint> since = {};
   /// Of links that are left out; of tried: failures of the task.
   std::size_t count = 0;
-  /// Of busy: whose tasks the workers have, each once. Of no_job: those that are paused.
+  /// Of busy: whose tasks the workers have, each once. Of no_job: those that are paused. Of store:
+  /// others that fill it.
   std::vector<Digest> jobs = {};
   std::uint64_t need_bytes = 0, free_bytes = 0;
 };

@@ -114,7 +114,7 @@ void Scheduler::on(const JobPaused& event, TimePoint, Actions& actions) {
   Job* job = find(event.job);
   if (!job || job->status != JobStatus::running) return;
   const bool waits = !event.waits.empty();
-  if (waits) job->waits = event.waits;
+  job->waits = event.waits;
   pause_job(event.job, *job, waits ? "paused, it waits for " + event.waits : "paused", actions);
 }
 
@@ -241,6 +241,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   const bool is_shared = !leases_.at({event.lease.job, claim.task}).may_hold;
   claim.job->tasks.complete(claim.task, completion, event.worker, is_shared, blobs_);
   claim.job->sizes.learn(completion.made.outputs);
+  claim.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = {};
   follow_longest(claim.job->longest_seconds.at(static_cast<std::size_t>(event.lease.task.kind)),
                  event.made.stats.cpu_seconds);
   if (claim.job->status == JobStatus::running) claim.job->waits.clear();

@@ -56,10 +56,11 @@ class Scheduler {
     BlobSizes sizes;
     /// The one after the last of which a task was granted.
     Run begun_runs{0};
-    std::array<TimePoint, 3> rests_until = {};  ///< tasks of each kind
-    std::string waits = {};                     ///< for what, as far as an event said so
-    std::string renderer = {};                  ///< of what is done; empty: not known
-    bool is_mixed = false;                      ///< others have made some of it, too
+    /// Tasks of each kind, after one found no space and until one is done; 0: they do not.
+    std::array<TimePoint, 3> rests_until = {};
+    std::string waits = {};     ///< for what, as far as an event said so
+    std::string renderer = {};  ///< of what is done; empty: not known
+    bool is_mixed = false;      ///< others have made some of it, too
     /// Since then nobody renders so, and others would take over.
     std::optional<TimePoint> alone_since = {};
     Standings standings = {};
@@ -87,8 +88,8 @@ class Scheduler {
   };
   explicit Scheduler(const Rules& rules) : rules_(rules) {}
 
-  /// How long tasks of a kind rest after one of them found no space.
-  static constexpr std::chrono::seconds kRest{5};
+  /// How long tasks of a kind rest after one of them found no space; then one tries.
+  static constexpr std::chrono::seconds kRest{10};
   /// For so many tasks held states are asked for at once where a worker has nothing to do.
   static constexpr std::size_t kMaxTasksFreed = 8;
 

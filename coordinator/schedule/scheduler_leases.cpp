@@ -354,6 +354,9 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     granted.may_hold =
         baton::may_hold(job.tasks, *task) && job.homes.surround(lease.task.tile, worker);
     job.tasks.share_inputs(*task, worker, blobs_);
+    // Where the last one found no space one tells whether there is some.
+    TimePoint& rests_until = job.rests_until.at(static_cast<std::size_t>(lease.task.kind));
+    if (rests_until != TimePoint()) rests_until = now + kRest;
     const double seconds = job.longest_seconds.at(static_cast<std::size_t>(lease.task.kind));
     actions.push_back(GrantLease{{.lease = lease,
                                   .inputs = job.tasks.ledger().inputs(job.tasks.view(), *task),

@@ -29,7 +29,11 @@ bool Scheduler::has_room_for(const Job& job, TaskIndex task, bool others_wait) c
   if (rules_.store_limit == 0) return true;
   std::vector<JobInStore> others;
   for (const auto& [digest, other] : jobs_) {
-    if (&other != &job && is_open(other.status)) others.push_back(other.in_store());
+    if (&other == &job || !is_open(other.status)) continue;
+    // Who cannot go on keeps nobody from what is idle.
+    const bool may_go_on =
+        other.status == JobStatus::running && !leases_.alike(other.renderer).empty();
+    if (may_go_on || !leases_.empty()) others.push_back(other.in_store());
   }
   return has_room(room(), job.in_store(), others, task, others_wait);
 }

@@ -359,6 +359,15 @@ std::string Answers::busy_text(const Cause& cause) const {
 
 namespace {
 
+std::string jobs_text(const History& history, const std::vector<Digest>& jobs) {
+  std::vector<std::string> names;
+  for (const Digest& job : std::span(jobs).first(std::min(jobs.size(), kMostNames)))
+    names.push_back(history.name_of(job));
+  const std::size_t more = jobs.size() - names.size();
+  return fmt::format("{}{}", fmt::join(names, ", "),
+                     more > 0 ? fmt::format(" and {} more", more) : "");
+}
+
 /// What the workers have done, behind their names.
 std::string tried_text(const Cause& cause, const std::string& place) {
   const bool many = cause.workers.size() > 1;
@@ -370,6 +379,14 @@ std::string tried_text(const Cause& cause, const std::string& place) {
 }
 
 }  // namespace
+
+std::string Answers::store_text(const Cause& cause, const std::string& place) const {
+  return fmt::format("the store has no room for all tiles of {}: they need {}, free {}{}", place,
+                     bytes_text(cause.need_bytes), bytes_text(cause.free_bytes),
+                     cause.jobs.empty() ? ""
+                                        : "; it also holds what is begun of " +
+                                              jobs_text(farm_.history, cause.jobs));
+}
 
 std::string Answers::text_of(const Cause& cause) const {
   const std::string who = names_text(cause.workers);
@@ -405,8 +422,7 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::tried:
       return fmt::format("{} {}", who, tried_text(cause, place(cause)));
     case ReasonKind::store:
-      return fmt::format("the store has no room for {}: it needs {}, free {}", place(cause),
-                         bytes_text(cause.need_bytes), bytes_text(cause.free_bytes));
+      return store_text(cause, place(cause));
     case ReasonKind::disk:
       return "it waits for " + (cause.text.empty() ? std::string("a disk") : cause.text);
     case ReasonKind::paused:

@@ -39,6 +39,7 @@ class Answers {
   std::string paused_text(const std::vector<Digest>& jobs) const;
   std::string turned_away_text() const;
   std::string busy_text(const Cause& cause) const;
+  std::string store_text(const Cause& cause, const std::string& place) const;
   std::string place(const Cause& cause) const;
   JobId id_of(const Digest& version) const { return farm_.history.jobs().of(version).id; }
 

@@ -45,13 +45,14 @@ FarmCore::FarmCore(const ServiceOptions& with, Router messages, Journal records,
       history(journal) {}
 
 Status FarmCore::let_out() {
-  for (const Outgoing& outgoing : std::exchange(outbox_, {})) {
-    if (!router.send(outgoing.peer, outgoing.message))
-      spdlog::debug("a peer is gone or does not read; message dropped");
-  }
+  // Before anybody hears that a job has ended.
   for (const auto& [job, mark] : std::exchange(unmarked_, {})) {
     std::error_code error;  // where it cannot be removed, it could not be written
     if (!marked_.contains(job)) fs::remove(mark, error);
+  }
+  for (const Outgoing& outgoing : std::exchange(outbox_, {})) {
+    if (!router.send(outgoing.peer, outgoing.message))
+      spdlog::debug("a peer is gone or does not read; message dropped");
   }
   return garbage.remove_some(store, [this](const Digest& blob) -> Result<bool> {
     BATON_ASSIGN(const bool is_kept, journal.is_kept(blob));

@@ -113,7 +113,11 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
                                                       .plates = machine.memory.pictures(),
                                                       .roots = machine.roots});
   loaded->job.output.directory = here.job.output.directory;
-  BATON_TRY(check_roots(here, machine.roots));
+  // The coordinator has let it in: it is this worker that may not see all of it.
+  if (const Status may = check_roots(here, machine.roots); !may) {
+    loaded->unseen = "all files of the job: " + may.error().message;
+    return LoadedJobPtr(std::move(loaded));
+  }
   if (const Status seen = expect_output_folder(*loaded); !seen) {
     loaded->unseen = seen.error().message;
     return LoadedJobPtr(std::move(loaded));

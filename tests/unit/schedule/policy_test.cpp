@@ -92,7 +92,8 @@ TEST(StoreRoom, ARunIsBegunWhenAllOfItFits) {
   room.used = 1;
   EXPECT_FALSE(has_room(room, fresh, {}, first, false));
   room.is_idle = true;
-  EXPECT_TRUE(has_room(room, fresh, {}, first, false)) << "nobody else begins anything";
+  EXPECT_FALSE(has_room(room, fresh, {}, first, false)) << "it would stand still with most of it";
+  EXPECT_TRUE(has_room({.limit = 81, .used = 1}, fresh, {}, first, false));
   room.expected = 40;
   EXPECT_FALSE(has_room(room, fresh, {}, first, false)) << "the task itself does not fit";
   EXPECT_TRUE(has_room(room, fresh, {}, *graph.find(assemble(0)), false));
@@ -115,12 +116,13 @@ TEST(StoreRoom, ARunThatWasBegunEndsThoughItsTilesAreLarger) {
   const TaskIndex task = *graph.find(render(0, 0));
   const JobInStore fresh{graph, book, sizes, baton::Run(0)};
   const JobInStore begun{graph, book, sizes, baton::Run(1)};
-  StoreRoom room{.limit = 80, .used = 50, .is_idle = true};
+  StoreRoom room{.limit = 80, .used = 10, .is_idle = true};
   EXPECT_TRUE(has_room(room, begun, {}, task, false));
   EXPECT_FALSE(has_room(room, fresh, {}, task, false)) << "nothing new is begun so";
   room.is_idle = false;
-  EXPECT_FALSE(has_room(room, begun, {}, task, false)) << "who works may make room";
-  room = {.limit = 80, .used = 51, .is_idle = true};
+  EXPECT_TRUE(has_room(room, begun, {}, task, false));
+  EXPECT_FALSE(has_room(room, begun, std::vector{begun}, task, false)) << "others were begun, too";
+  room = {.limit = 80, .used = 11, .is_idle = true};
   EXPECT_FALSE(has_room(room, begun, {}, task, false)) << "more than an eighth";
 }
 

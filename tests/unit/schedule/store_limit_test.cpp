@@ -78,7 +78,7 @@ TEST(StoreLimit, AJobThatCannotGoOnSaysWhy) {
   EXPECT_EQ(
       farm.waits(),
       "room in the store: it holds 40 B of the 70 B that --store-limit allows, 0 B of them of "
-      "jobs that have ended and the rest of this one, and the next task needs about 40 B: raise "
+      "jobs that have ended and the rest of this one, and its next frames need about 40 B: raise "
       "the limit");
   // It waits for nothing else while frames can still be written.
   LimitedFarm other(1000);
