@@ -74,6 +74,12 @@ Cause running_of(const Lease& lease) {
           .since = lease.granted_at};
 }
 
+std::string failure_text(const Blame& blame) {
+  return fmt::format("has failed it {}{}",
+                     blame.failures == 1 ? "once" : fmt::format("{} times", blame.failures),
+                     blame.message.empty() ? "" : ", the last time: " + blame.message);
+}
+
 std::string room_text(const Scheduler& scheduler, const Scheduler::Job& job) {
   const std::uint64_t ended = scheduler.kept_bytes();
   const auto open = std::ranges::count_if(scheduler.jobs(), [&](const Digest& digest) {
@@ -235,6 +241,19 @@ void Reasons::leave_out(const Cause& cause, Chain& chain) const {
                                                          : "rests from it after failures";
 }
 
+/// Workers that are connected and have failed the task, which another one may try.
+void Reasons::tell_failures(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
+                            Chain& chain) const {
+  for (const auto& [worker, own] : job.tasks.attempts().blame(task)) {
+    if (!scheduler_.leases().knows(worker)) continue;
+    chain.push_back({.kind = ReasonKind::left_out,
+                     .job = digest,
+                     .task = job.tasks.graph().key(task),
+                     .workers = {worker},
+                     .text = failure_text(own)});
+  }
+}
+
 /// Those of the workers that have failed the task, with what they said last, or rest from the job
 /// after other failures.
 Cause Reasons::tried(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
@@ -294,6 +313,7 @@ std::optional<TaskIndex> Reasons::explain_ready(const Digest& digest, const Sche
     chain.push_back(tried(digest, job, task, alike));
     return std::nullopt;
   }
+  if (able.size() < alike.size()) tell_failures(digest, job, task, chain);
   std::vector<std::string> readers = able;
   std::erase_if(readers, [&](const auto& w) { return !can_read(job.tasks, task, w); });
   if (readers.empty()) {

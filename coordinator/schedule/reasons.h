@@ -67,6 +67,8 @@ class Reasons {
   Cause tried(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
               const std::vector<std::string>& workers) const;
   void leave_out(const Cause& cause, Chain& chain) const;
+  void tell_failures(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
+                     Chain& chain) const;
   std::optional<TaskIndex> chosen_for(const std::string& worker, const Scheduler::Job& job) const;
   void explain_free(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
                     const std::string& worker, Chain& chain) const;

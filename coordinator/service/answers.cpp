@@ -409,7 +409,9 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::skipped:
       return fmt::format("and so on, {} times", cause.count);
     case ReasonKind::left_out:
-      return fmt::format("{} gets none of its tasks: it {}", who, cause.text);
+      return fmt::format("{} {}: it {}", who,
+                         cause.task ? "is not given " + place(cause) : "gets none of its tasks",
+                         cause.text);
     case ReasonKind::running:
       return fmt::format("{} is with {}", place(cause), who);
     case ReasonKind::no_worker:

@@ -61,8 +61,14 @@ JobEstimate estimate_job(const JobSpec& job) {
       job.image.most_sites() * (rounds_have_own_sites(job) ? e.rounds : job.quality.sweeps);
   if (has_fine_sites(job)) e.primary_rays_per_pixel += limits::kGeometryProbes;
   e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling) * e.rounds;
-  e.shadow_rays_per_pixel +=
-      e.rounds * job.light.bounces * limits::kBouncePaths * (1 + limits::kBounceRays);
+  if (job.light.bounces > 0) {
+    // Paths, each with its shadow rays; those that are shared with some more, and to all members.
+    constexpr int kMembers = limits::kBounceBlock * limits::kBounceBlock / 4;
+    constexpr int kOfPath = limits::kBouncePaths * (1 + limits::kBounceRays);
+    constexpr int kShared = limits::kSharedBouncePaths *
+                            (kMembers - 1 + limits::kSharedBounceRays - limits::kBounceRays);
+    e.shadow_rays_per_pixel += e.rounds * (job.light.bounces * kOfPath + kShared);
+  }
   if (draws_twice(job)) e.shadow_rays_per_pixel *= 2;
 
   // Add up the planes: R, G, B, A and the AOVs.

@@ -196,7 +196,7 @@ TEST_F(RequeueTest, APictureIsTheLastFrameOrTheTilesOfOneInWork) {
   EXPECT_THAT(refused(endpoint, AskPicture{"test", true, FrameNumber(9)}).message,
               HasSubstr("no frames 9, expected some of 1-4"));
 
-  worker.do_one_task();
+  do_one_task(worker);
   const auto tiles = ask<PictureSource>(endpoint, partial);
   EXPECT_EQ(tiles.frame, FrameNumber(1));
   EXPECT_FALSE(tiles.is_written);
