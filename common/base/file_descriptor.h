@@ -2,7 +2,11 @@
 
 #include <unistd.h>
 
+#include <filesystem>
+#include <optional>
 #include <utility>
+
+#include "common/base/result.h"
 
 namespace baton {
 
@@ -25,5 +29,9 @@ class FileDescriptor {
  private:
   int number_;
 };
+
+/// Locks a file, which is made where there is none, until the result is closed. None: another
+/// process has it locked. Error, io: the disk.
+Result<std::optional<FileDescriptor>> try_lock_file(const std::filesystem::path& path);
 
 }  // namespace baton

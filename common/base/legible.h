@@ -14,4 +14,9 @@ std::string legible_line(std::string_view text);
 /// Lines: line breaks and tabs stay.
 std::string legible_text(std::string_view text);
 
+/// Up to the first line break.
+constexpr std::string_view first_line(std::string_view text) {
+  return text.substr(0, text.find('\n'));
+}
+
 }  // namespace baton

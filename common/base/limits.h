@@ -72,8 +72,10 @@ inline constexpr int kMaxPreroll = 64;  ///< rounds
 inline constexpr int kMaxBounces = 64;
 /// Paths of a pixel and round, for light between surfaces; and of one that shares what they find.
 inline constexpr int kBouncePaths = 16, kSharedBouncePaths = 4;
-/// Side of the blocks of pixels in which they share; tiles are whole numbers of them.
+/// Side of the blocks of pixels in which they share, a quarter of a block at a time; tiles are
+/// whole numbers of them.
 inline constexpr int kBounceBlock = 8;
+inline constexpr int kBounceMembers = kBounceBlock * kBounceBlock / 4;
 /// Shadow rays of each surface that such a path meets; and of one whose light is shared.
 inline constexpr int kBounceRays = 2, kSharedBounceRays = 4;
 inline constexpr int kMaxParticles = 64;

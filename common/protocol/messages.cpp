@@ -111,6 +111,10 @@ Status check_header(ByteView header) {
 
 }  // namespace
 
+std::string WorkerHello::own_name() const {
+  return fmt::format("{}#{:08x}", worker_id, static_cast<std::uint32_t>(instance));
+}
+
 std::vector<Bytes> encode_message(const Message& message) {
   ByteWriter header;
   header.put_raw(as_bytes_view(kProtocolName));

@@ -36,6 +36,9 @@ struct WorkerHello {
   std::string renderer;
   /// Leases of the worker, which a restarted coordinator may adopt.
   std::vector<LeaseId> running;
+
+  /// By which it goes where another process has its name: with some digits of its instance.
+  std::string own_name() const;
 };
 /// `count` more leases are wanted; replaces what was asked before.
 struct LeaseRequest {

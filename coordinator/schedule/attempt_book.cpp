@@ -2,14 +2,16 @@
 
 #include <algorithm>
 
+#include "common/base/legible.h"
+
 namespace baton {
 
 void AttemptBook::add_failure(TaskIndex task, const Failure& failure) {
   has_failed_ = true;
   constexpr std::size_t kMostShown = 300;
-  const std::size_t end = std::min(failure.message.find('\n'), kMostShown);
+  const std::string_view message = first_line(failure.message).substr(0, kMostShown);
   ended_[task].push_back(
-      {failure.lease, failure.worker, true, failure.permanent, failure.message.substr(0, end)});
+      {failure.lease, failure.worker, true, failure.permanent, std::string(message)});
   ++num_lost_;
 }
 

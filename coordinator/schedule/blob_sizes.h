@@ -20,8 +20,9 @@ class BlobSizes {
   std::uint64_t largest(const JobGraph& graph, const TaskKey& task) const;
   /// The same on average.
   std::uint64_t mean(const JobGraph& graph, const TaskKey& task) const;
-  /// What a state takes on average.
-  std::uint64_t mean_state() const { return of(BlobKind::state).sum / of(BlobKind::state).count; }
+  /// What a state takes on average, and a film.
+  std::uint64_t mean_state() const { return mean(BlobKind::state); }
+  std::uint64_t mean_film() const { return mean(BlobKind::film); }
   /// What the largest state takes.
   std::uint64_t largest_state() const { return of(BlobKind::state).largest; }
   /// Whether nothing in these sizes of the task's outputs is estimated.
@@ -33,6 +34,7 @@ class BlobSizes {
     bool is_estimated = false;
   };
   static constexpr std::array kKinds{BlobKind::state, BlobKind::film, BlobKind::first_pass};
+  std::uint64_t mean(BlobKind kind) const { return of(kind).sum / of(kind).count; }
   const Size& of(BlobKind kind) const { return sizes_.at(static_cast<std::size_t>(kind)); }
 
   std::array<Size, 4> sizes_;  ///< by kind

@@ -1,11 +1,8 @@
 #include "coordinator/schedule/reasons.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <iterator>
 
-#include "common/base/size_text.h"
 #include "coordinator/schedule/held_states.h"
 
 namespace baton {
@@ -72,26 +69,6 @@ Cause running_of(const Lease& lease) {
           .task = lease.id.task,
           .workers = {lease.worker},
           .since = lease.granted_at};
-}
-
-std::string failure_text(const Blame& blame) {
-  return fmt::format("has failed it {}{}",
-                     blame.failures == 1 ? "once" : fmt::format("{} times", blame.failures),
-                     blame.message.empty() ? "" : ", the last time: " + blame.message);
-}
-
-std::string room_text(const Scheduler& scheduler, const Scheduler::Job& job) {
-  const std::uint64_t ended = scheduler.kept_bytes();
-  const auto open = std::ranges::count_if(scheduler.jobs(), [&](const Digest& digest) {
-    return is_open(scheduler.find_job(digest)->status);
-  });
-  return fmt::format(
-      "room in the store: it holds {} of the {} that --store-limit allows, {} of them of jobs that "
-      "have ended and the rest of {}, and its next frames need about {}: raise the limit{}",
-      bytes_text(scheduler.store_bytes()), bytes_text(scheduler.room().limit), bytes_text(ended),
-      open == 1 ? "this one" : fmt::format("{} open ones", open),
-      bytes_text(needed_bytes(job.in_store(), *job.tasks.book().ready().begin())),
-      ended > 0 ? ", or delete ended jobs (`baton job list --all`)" : "");
 }
 
 }  // namespace
@@ -250,7 +227,8 @@ void Reasons::tell_failures(const Digest& digest, const Scheduler::Job& job, Tas
                      .job = digest,
                      .task = job.tasks.graph().key(task),
                      .workers = {worker},
-                     .text = failure_text(own)});
+                     .text = own.message,
+                     .count = static_cast<std::size_t>(own.failures)});
   }
 }
 
@@ -366,29 +344,46 @@ void Reasons::explain_free(const Digest& digest, const Scheduler::Job& job, Task
                      .awaited = graph.key(*chosen)});
     task = *chosen;
   }
-  bool others_wait = false;
-  for (const Digest& before : scheduler_.in_turn()) {
-    if (before == digest) break;
-    const Scheduler::Job& other = *scheduler_.find_job(before);
-    const std::set<TaskIndex>& ready = other.tasks.book().ready();
-    others_wait |= !ready.empty() && !scheduler_.has_room_for(other, *ready.begin(), false);
+  // What jobs that come first wait for, and who waits for the most.
+  Room before = Room::enough;
+  std::optional<Digest> waiting;
+  for (const Digest& first : scheduler_.in_turn()) {
+    if (first == digest) break;
+    const Scheduler::Job& other = *scheduler_.find_job(first);
+    if (other.tasks.book().ready().empty()) continue;
+    const Room lack = RoomOfTasks(scheduler_, other, before).most();
+    if (lack <= before) continue;
+    before = lack;
+    waiting = first;
   }
   Cause cause{.kind = ReasonKind::asking, .job = digest, .task = graph.key(task)};
-  if (scheduler_.has_room_for(job, task, others_wait)) {
+  if (scheduler_.room_for(job, task, before) == Room::enough) {
     cause.workers = {worker};
   } else {
-    const StoreRoom room = scheduler_.room();
-    cause.kind = ReasonKind::store;
-    cause.need_bytes = needed_bytes(job.in_store(), task);
-    const std::uint64_t taken = room.used + room.expected;
-    cause.free_bytes = room.limit > taken ? room.limit - taken : 0;
-    for (const Digest& other : scheduler_.jobs()) {
-      const Scheduler::Job& holder = *scheduler_.find_job(other);
-      if (other != digest && holder.begun_runs > Run(0) && is_open(holder.status))
-        cause.jobs.push_back(other);
-    }
+    explain_room(digest, job, task, waiting, cause);
   }
   chain.push_back(std::move(cause));
+}
+
+/// Why the store has no room for the task. waiting: a job that comes first and waits for room.
+void Reasons::explain_room(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
+                           const std::optional<Digest>& waiting, Cause& cause) const {
+  const StoreRoom room = scheduler_.room();
+  const std::uint64_t taken = room.used + room.expected;
+  cause.kind = ReasonKind::store;
+  cause.need_bytes = needed_bytes(job.in_store(), task);
+  cause.free_bytes = room.limit > taken ? room.limit - taken : 0;
+  cause.ended_bytes = scheduler_.kept_bytes();
+  cause.room = scheduler_.room_for(job, task, Room::enough);
+  if (cause.room == Room::enough) {
+    cause.jobs = {waiting.value()};  // which alone keeps it
+    return;
+  }
+  for (const Digest& other : scheduler_.jobs()) {
+    const Scheduler::Job& holder = *scheduler_.find_job(other);
+    if (other != digest && holder.begun_runs > Run(0) && is_open(holder.status))
+      cause.jobs.push_back(other);
+  }
 }
 
 /// All workers that could do a task have others.
@@ -450,53 +445,6 @@ std::optional<Cause> Reasons::refusal(const std::string& worker, const Digest& d
     return cause;
   }
   return std::nullopt;
-}
-
-bool lacks_room(const Scheduler& scheduler, const Digest& digest) {
-  const Scheduler::Job& job = *scheduler.find_job(digest);
-  const std::set<TaskIndex>& ready = job.tasks.book().ready();
-  if (job.status != JobStatus::running || !scheduler.leases().empty() || ready.empty())
-    return false;
-  // Assembly makes room; its tasks come first.
-  for (const Digest& other : scheduler.in_turn()) {
-    const JobTasks& tasks = scheduler.find_job(other)->tasks;
-    if (!tasks.book().ready().empty() && *tasks.book().ready().begin() < tasks.graph().num_frames())
-      return false;
-  }
-  return !scheduler.has_room_for(job, *ready.begin(), false);
-}
-
-std::string waits_for(const Scheduler& scheduler, const Digest& digest, TimePoint now) {
-  const Scheduler::Job& job = *scheduler.find_job(digest);
-  const LeaseBook& leases = scheduler.leases();
-  if (!is_open(job.status) || !job.waits.empty()) return job.waits;
-  if (scheduler.lacks_renderer(digest)) {
-    // Behind the instruction set it says by which build.
-    const auto build_of = [](const std::string& renderer) {
-      return renderer.substr(std::min(renderer.find(", baton "), renderer.size()));
-    };
-    const bool is_one_build = std::ranges::any_of(leases.connected(), [&](const auto& worker) {
-      return build_of(leases.renderer_of(worker)) == build_of(job.renderer);
-    });
-    return fmt::format(
-        "a worker that renders as what is done was rendered, with {}: those that are connected "
-        "render with {}, and pixels may differ. --restart renders all frames again, --from-frame N "
-        "those from N on{}",
-        job.renderer, leases.renderer_of(leases.connected().front()),
-        is_one_build ? "; `baton-worker --isa` makes unlike machines alike" : "");
-  }
-  if (lacks_room(scheduler, digest)) return room_text(scheduler, job);
-  if (leases.connected().empty()) return {};
-  const Crew crew = job.crew(leases, now);
-  if (const std::string unseen = job.standings.unseen(); !unseen.empty() && are_all_blind(crew))
-    return fmt::format("a worker that sees {}", unseen);
-  for (const TaskIndex task : job.tasks.attempts().tried()) {
-    if (job.tasks.book().status(task) != TaskStatus::ready) continue;
-    if (!somebody_may_try(crew, job.tasks.attempts().blame(task)))
-      return fmt::format("a worker that can do {}: those that are connected have failed it or rest",
-                         place_text(place_of(job, job.tasks.graph().key(task))));
-  }
-  return {};
 }
 
 }  // namespace baton

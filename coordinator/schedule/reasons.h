@@ -27,9 +27,10 @@ struct Cause {
   /// Of links that are left out; of tried: failures of the task.
   std::size_t count = 0;
   /// Of busy: whose tasks the workers have, each once. Of no_job: those that are paused. Of store:
-  /// others that fill it.
+  /// others that were begun; where there is room, the one that comes first.
   std::vector<Digest> jobs = {};
-  std::uint64_t need_bytes = 0, free_bytes = 0;
+  std::uint64_t need_bytes = 0, free_bytes = 0, ended_bytes = 0;
+  Room room = Room::enough;
 };
 
 /// What only the one who talks with the workers knows of them.
@@ -72,6 +73,8 @@ class Reasons {
   std::optional<TaskIndex> chosen_for(const std::string& worker, const Scheduler::Job& job) const;
   void explain_free(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
                     const std::string& worker, Chain& chain) const;
+  void explain_room(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
+                    const std::optional<Digest>& waiting, Cause& cause) const;
   void explain_busy(const Digest& digest, const TaskKey& task,
                     const std::vector<std::string>& workers, Chain& chain) const;
   Cause silence_of(const std::vector<std::string>& workers) const;
@@ -83,13 +86,5 @@ class Reasons {
   TimePoint now_;
   Conduct conduct_;
 };
-
-/// What the job, which must be known, cannot go on without; empty: it goes on, or has ended. Of a
-/// job that failed although its tasks are done, what somebody must decide.
-std::string waits_for(const Scheduler& scheduler, const Digest& job, TimePoint now);
-
-/// Whether the store has no room for the next task of the job, which must be known, and nothing in
-/// work will make some.
-bool lacks_room(const Scheduler& scheduler, const Digest& job);
 
 }  // namespace baton

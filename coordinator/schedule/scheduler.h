@@ -67,7 +67,9 @@ class Scheduler {
     std::array<double, 3> longest_seconds = {};  ///< CPU time of tasks of each kind, of late
 
     Rank rank() const { return {-spec.priority, sequence}; }
-    JobInStore in_store() const { return {tasks.graph(), tasks.book(), sizes, begun_runs}; }
+    JobInStore in_store(bool may_go_on = true) const {
+      return {spec, tasks.graph(), tasks.book(), sizes, begun_runs, may_go_on};
+    }
     /// Those that render as what is done of it.
     Crew crew(const LeaseBook& leases, TimePoint now) const {
       return {leases.alike(renderer), standings, now};
@@ -110,9 +112,9 @@ class Scheduler {
   }
   /// What the store may hold and holds.
   StoreRoom room() const;
-  /// Whether a ready task of the job may be granted (store_room.h). others_wait: a job before this
-  /// one waits for room.
-  bool has_room_for(const Job& job, TaskIndex task, bool others_wait) const;
+  /// Whether a ready task of the job may be granted (store_room.h). before: what jobs before this
+  /// one wait for.
+  Room room_for(const Job& job, TaskIndex task, Room before) const;
   /// What jobs that have ended leave in the store.
   std::uint64_t kept_bytes() const { return kept_bytes_; }
   /// What blobs take that somebody needs: jobs, and those that have ended (StoreKeeps).
@@ -210,5 +212,25 @@ TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t
 /// What decides the bytes of the job's tasks: the renderer of what is done or, where nothing is, of
 /// what is being done; empty: anybody may begin.
 std::string renderer_of(const Digest& digest, const Scheduler::Job& job, const LeaseBook& leases);
+
+/// The room for tasks of one job, asked for once for all tiles of a run or frame.
+class RoomOfTasks {
+ public:
+  /// Both outlive it, and do not change meanwhile. before: as of Scheduler::room_for.
+  RoomOfTasks(const Scheduler& scheduler, const Scheduler::Job& job, Room before)
+      : scheduler_(scheduler), job_(job), before_(before) {}
+  Room operator()(TaskIndex task);
+  /// What tasks that were asked for wait for, at most.
+  Room lack() const { return lack_; }
+  /// The most that one of the ready tasks finds.
+  Room most();
+
+ private:
+  const Scheduler& scheduler_;
+  const Scheduler::Job& job_;
+  const Room before_;
+  std::map<std::pair<TaskKind, std::int32_t>, Room> known_;
+  Room lack_ = Room::enough;
+};
 
 }  // namespace baton

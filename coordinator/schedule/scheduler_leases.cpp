@@ -329,7 +329,7 @@ bool Scheduler::take_over(const std::string& worker, const Digest& digest, Job& 
 }
 
 bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& actions) {
-  bool others_wait = false;
+  Room before = Room::enough;
   for (const auto& [rank, digest] : running_) {
     Job& job = jobs_.at(digest);
     if (job.tasks.book().ready().empty()) continue;
@@ -339,14 +339,15 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     const Crew crew = job.crew(leases_, now);
     if (rests(crew, worker)) continue;
     const JobGraph& graph = job.tasks.graph();
+    RoomOfTasks room(*this, job, before);
     const auto task = job.homes.choose(
         graph, job.tasks.book().ready(),
         last_due_run(graph, job.tasks.book(), job.max_frames_ahead), worker, [&](TaskIndex ready) {
-          return job.is_due(ready, worker, crew) && can_read(job.tasks, ready, worker);
+          return job.is_due(ready, worker, crew) && can_read(job.tasks, ready, worker) &&
+                 room(ready) == Room::enough;
         });
-    if (!task) continue;
-    if (!has_room_for(job, *task, others_wait)) {
-      others_wait = true;
+    if (!task) {
+      before = std::max(before, room.lack());
       continue;
     }
     const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), rules_.epoch};

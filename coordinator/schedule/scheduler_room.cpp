@@ -22,20 +22,36 @@ void Scheduler::on(const AttemptLeft& attempt, TimePoint, Actions&) {
 }
 
 StoreRoom Scheduler::room() const {
-  return {rules_.store_limit, store_bytes(), leases_.expected_bytes(), leases_.empty()};
+  return {rules_.store_limit, store_bytes(), leases_.expected_bytes(), kept_bytes_,
+          leases_.empty()};
 }
 
-bool Scheduler::has_room_for(const Job& job, TaskIndex task, bool others_wait) const {
-  if (rules_.store_limit == 0) return true;
+Room Scheduler::room_for(const Job& job, TaskIndex task, Room before) const {
+  if (rules_.store_limit == 0) return Room::enough;
   std::vector<JobInStore> others;
   for (const auto& [digest, other] : jobs_) {
     if (&other == &job || !is_open(other.status)) continue;
-    // Who cannot go on keeps nobody from what is idle.
-    const bool may_go_on =
-        other.status == JobStatus::running && !leases_.alike(other.renderer).empty();
-    if (may_go_on || !leases_.empty()) others.push_back(other.in_store());
+    others.push_back(other.in_store(other.status == JobStatus::running &&
+                                    !leases_.alike(other.renderer).empty()));
   }
-  return has_room(room(), job.in_store(), others, task, others_wait);
+  return baton::room_for(room(), job.in_store(), others, task, before);
+}
+
+Room RoomOfTasks::operator()(TaskIndex task) {
+  const TaskKey key = job_.tasks.graph().key(task);
+  if (key.kind == TaskKind::assemble) return Room::enough;
+  const std::int32_t place = key.kind == TaskKind::render ? key.run().value() : key.step().value();
+  const auto [found, is_new] = known_.try_emplace({key.kind, place});
+  if (is_new) found->second = scheduler_.room_for(job_, task, before_);
+  lack_ = std::max(lack_, found->second);
+  return found->second;
+}
+
+Room RoomOfTasks::most() {
+  for (const TaskIndex task : job_.tasks.book().ready()) {
+    if ((*this)(task) == Room::enough) return Room::enough;
+  }
+  return lack_;
 }
 
 }  // namespace baton

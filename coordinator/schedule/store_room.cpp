@@ -1,38 +1,28 @@
 #include "coordinator/schedule/store_room.h"
 
 #include <algorithm>
+#include <vector>
+
+#include "common/job/motion.h"
+#include "common/job/plan/store_estimate.h"
 
 namespace baton {
 namespace {
 
-/// By this share of the limit the store may hold more, so that a run that was begun ends.
+/// By this share of the limit the store may hold more, so that runs that were begun end.
 constexpr std::uint64_t kSlackShare = 8;
+/// Runs of a job that are in work together.
+constexpr std::int32_t kRunsInWork = 2;
 
-}  // namespace
-
-std::uint64_t unmade_bytes(const JobInStore& job, Run end) {
-  const JobGraph& graph = job.graph;
-  std::uint64_t bytes = 0;
-  for (Run run = job.book.first_open_run(); run < end; ++run) {
-    bytes += static_cast<std::uint64_t>(job.book.num_open_renders(run)) *
-             job.sizes.mean(graph, render_task(run, 0));
-  }
-  if (!graph.has_second_pass() || end == Run(0)) return bytes;
-  const Timeline& timeline = graph.timeline();
-  const Step first_unwritten = timeline.last_step_of(job.book.first_open_frame());
-  const std::int32_t steps = timeline.steps_of(end - 1).last + 1 - first_unwritten;
-  return bytes + static_cast<std::uint64_t>(std::max(0, steps)) *
-                     static_cast<std::uint64_t>(graph.num_tiles()) *
-                     job.sizes.mean(graph, second_pass_task(Step(0), 0));
+std::uint64_t times(std::int64_t count, std::uint64_t bytes) {
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(count, 0)) * bytes;
 }
 
-namespace {
-
-/// What goes from the store while a run is made: the states that it goes on from.
-std::uint64_t replaced_bytes(const JobInStore& job, Run run) {
-  const bool goes_on =
-      run > Run(0) && job.graph.num_outputs(render_task(run - 1, 0), BlobKind::state) > 0;
-  return goes_on ? static_cast<std::uint64_t>(job.graph.num_tiles()) * job.sizes.mean_state() : 0;
+std::int32_t num_open_second_passes(const JobInStore& job, Step step) {
+  std::int32_t count = 0;
+  for (std::int32_t tile = 0; tile < job.graph.num_tiles(); ++tile)
+    count += is_open(job.book.status(*job.graph.find(second_pass_task(step, tile)))) ? 1 : 0;
+  return count;
 }
 
 /// The run of a task's frames.
@@ -40,33 +30,130 @@ Run run_of(const JobGraph& graph, const TaskKey& key) {
   return key.kind == TaskKind::render ? key.run() : graph.timeline().run_of(key.step());
 }
 
+/// The end of the runs that are in work: of those that were begun others may be wanted once more.
+Run end_in_work(const JobInStore& job) {
+  return std::min(job.begun_runs, job.book.first_open_run() + kRunsInWork);
+}
+
+/// What a job takes at most.
+struct Claim {
+  std::uint64_t stays = 0;     ///< states and films that are there between its runs
+  std::uint64_t run = 0;       ///< beside them, while a run is made
+  std::uint64_t replaced = 0;  ///< states that go while a run is made
+  std::uint64_t at_end = 0;    ///< what goes when it has ended
+
+  std::uint64_t whole() const { return stays + run; }
+};
+Claim claim_of(const JobInStore& job) {
+  const JobGraph& graph = job.graph;
+  const TaskKey render = render_task(Run(0), 0);
+  const std::int64_t tiles = graph.num_tiles();
+  const std::int64_t sets = num_state_sets(job.spec);
+  const std::uint64_t set = sets > 0 ? times(tiles, job.sizes.mean_state()) : 0;
+  std::uint64_t films = times(tiles, job.sizes.mean(graph, render)) -
+                        times(graph.num_outputs(render, BlobKind::state), set);
+  if (graph.has_second_pass()) {
+    const std::int64_t steps = graph.timeline().steps_of(Run(0)).size();
+    films += times(steps * tiles, job.sizes.mean(graph, second_pass_task(Step(0), 0)));
+  }
+  // A tile has its old state and its new one for a moment; in motion others read the old one.
+  const bool is_shared = shares_history(job.spec);
+  const std::uint64_t twice = is_shared ? set : std::min(set, 4 * job.sizes.largest(graph, render));
+  const bool has_all = job.book.first_open_run().value() >= sets;
+  return {.stays = times(sets, set) +
+                   times(tiles * num_films_that_stay(job.spec), job.sizes.mean_film()),
+          .run = films + twice,
+          .replaced = has_all && !is_shared ? set : 0,
+          .at_end = times(sets - 1, set)};
+}
+
+/// Whether all jobs that were begun, and this one, can end one after the other [Dijkstra 1965, the
+/// banker's algorithm], a run being what is lent. Those that could not even alone are not waited
+/// for.
+bool can_all_end(const StoreRoom& room, const JobInStore& job, std::span<const JobInStore> others) {
+  std::vector<Claim> claims{claim_of(job)};
+  if (claims[0].whole() > room.limit) return false;
+  std::uint64_t taken = room.kept + claims[0].stays;
+  for (const JobInStore& other : others) {
+    if (other.begun_runs == Run(0)) continue;
+    const Claim claim = claim_of(other);
+    if (claim.whole() > room.limit) {
+      taken += std::min(claim.stays, room.used - std::min(room.used, room.kept));
+      continue;
+    }
+    taken += claim.stays;
+    claims.push_back(claim);
+  }
+  // What is not made may turn out larger.
+  const std::uint64_t budget = room.limit - room.limit / kSlackShare;
+  if (taken > budget) return false;
+  std::uint64_t free = budget - taken;
+  std::ranges::sort(claims, {}, &Claim::run);
+  for (const Claim& claim : claims) {
+    if (claim.run > free) return false;
+    free += claim.at_end;
+  }
+  return true;
+}
+
+bool any_begun(std::span<const JobInStore> jobs) {
+  return std::ranges::any_of(jobs, [](const JobInStore& job) { return job.begun_runs > Run(0); });
+}
+
 }  // namespace
+
+std::uint64_t unmade_bytes(const JobInStore& job, Run end) {
+  const JobGraph& graph = job.graph;
+  std::uint64_t bytes = 0;
+  for (Run run = job.book.first_open_run(); run < end; ++run)
+    bytes += times(job.book.num_open_renders(run), job.sizes.mean(graph, render_task(run, 0)));
+  if (!graph.has_second_pass() || end == Run(0)) return bytes;
+  const Timeline& timeline = graph.timeline();
+  const Step last = timeline.steps_of(end - 1).last;
+  for (Step step = timeline.last_step_of(job.book.first_open_frame()); step <= last; ++step)
+    bytes +=
+        times(num_open_second_passes(job, step), job.sizes.mean(graph, second_pass_task(step, 0)));
+  return bytes;
+}
 
 std::uint64_t needed_bytes(const JobInStore& job, TaskIndex task) {
   const TaskKey key = job.graph.key(task);
-  return std::max(job.sizes.largest(job.graph, key), unmade_bytes(job, run_of(job.graph, key) + 1));
+  const std::uint64_t of_frames =
+      key.kind == TaskKind::second_pass
+          ? times(num_open_second_passes(job, key.step()), job.sizes.mean(job.graph, key))
+          : unmade_bytes(job, run_of(job.graph, key) + 1);
+  return std::max(job.sizes.largest(job.graph, key), of_frames);
 }
 
-bool has_room(const StoreRoom& room, const JobInStore& job, std::span<const JobInStore> others,
-              TaskIndex task, bool others_wait) {
+Room room_for(const StoreRoom& room, const JobInStore& job, std::span<const JobInStore> others,
+              TaskIndex task, Room before) {
   const TaskKey key = job.graph.key(task);
-  if (room.limit == 0 || key.kind == TaskKind::assemble) return true;
+  if (room.limit == 0 || key.kind == TaskKind::assemble) return Room::enough;
+  const auto enough_if = [](bool is_enough) { return is_enough ? Room::enough : Room::too_little; };
+  const bool is_new = job.begun_runs == Run(0);
+  if (is_new && any_begun(others) && !can_all_end(room, job, others)) return Room::beside;
   // Where sizes are estimated and nobody works, one task tells more.
-  if (room.is_idle && !job.sizes.are_known(job.graph, key)) return room.used < room.limit;
+  if (room.is_idle && !job.sizes.are_known(job.graph, key))
+    return enough_if(room.used < room.limit);
   const std::uint64_t more = room.limit + room.limit / kSlackShare;
-  if (room.used + room.expected + job.sizes.largest(job.graph, key) >
-      (room.is_idle ? more : room.limit))
-    return false;
-  const Run run = run_of(job.graph, key);
-  const bool is_begun = run < job.begun_runs;
-  if (!is_begun && others_wait) return false;
-  // What was begun is finished, although tiles turn out larger than those before: where nobody
-  // works by one that can end alone.
-  std::uint64_t bytes = room.used + unmade_bytes(job, run + 1);
-  if (room.is_idle) bytes -= std::min(bytes, replaced_bytes(job, run));
-  if (is_begun && room.is_idle) return bytes <= more;
-  for (const JobInStore& other : others) bytes += unmade_bytes(other, other.begun_runs);
-  return bytes <= (is_begun ? more : room.limit);
+  const std::uint64_t with_task = room.used + room.expected + job.sizes.largest(job.graph, key);
+  if (with_task > (room.is_idle ? more : room.limit)) return Room::too_little;
+
+  const bool is_begun =
+      key.kind == TaskKind::second_pass || run_of(job.graph, key) < end_in_work(job);
+  std::uint64_t bytes = room.used + needed_bytes(job, task);
+  if (is_begun && room.is_idle && bytes <= more) return Room::enough;
+  for (const JobInStore& other : others) {
+    const std::uint64_t unmade = unmade_bytes(other, end_in_work(other));
+    const bool is_stuck = room.is_idle && room.used + unmade > more;  // it can wait
+    if (other.may_go_on && !is_stuck) bytes += unmade;
+  }
+  if (is_begun) return enough_if(bytes <= more);
+  if (!room.is_idle && (before == Room::too_little || (before == Room::beside && is_new)))
+    return before;
+  // Nobody else makes room.
+  const std::uint64_t replaced = room.is_idle ? claim_of(job).replaced : 0;
+  return enough_if(bytes - std::min(bytes, replaced) <= room.limit);
 }
 
 }  // namespace baton

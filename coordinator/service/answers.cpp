@@ -20,14 +20,12 @@ constexpr std::chrono::milliseconds kAbsentFor{std::chrono::hours(24)};
 constexpr std::chrono::minutes kAsksAgainWithin{1};
 
 /// "worker a", "workers a, b and 12 more".
-std::string names_text(const std::vector<std::string>& workers) {
-  if (workers.empty()) return "nobody";
-  std::vector<std::string> first(
-      workers.begin(),
-      workers.begin() + static_cast<std::ptrdiff_t>(std::min(workers.size(), kMostNames)));
+std::string names_text(const std::vector<std::string>& names, const char* what = "worker") {
+  if (names.empty()) return "nobody";
+  const auto first = std::span(names).first(std::min(names.size(), kMostNames));
   return fmt::format(
-      "worker{} {}{}", workers.size() > 1 ? "s" : "", fmt::join(first, ", "),
-      workers.size() > kMostNames ? fmt::format(" and {} more", workers.size() - kMostNames) : "");
+      "{}{} {}{}", what, names.size() > 1 ? "s" : "", fmt::join(first, ", "),
+      names.size() > kMostNames ? fmt::format(" and {} more", names.size() - kMostNames) : "");
 }
 
 Conduct conduct_of(const FarmCore& farm) {
@@ -359,15 +357,6 @@ std::string Answers::busy_text(const Cause& cause) const {
 
 namespace {
 
-std::string jobs_text(const History& history, const std::vector<Digest>& jobs) {
-  std::vector<std::string> names;
-  for (const Digest& job : std::span(jobs).first(std::min(jobs.size(), kMostNames)))
-    names.push_back(history.name_of(job));
-  const std::size_t more = jobs.size() - names.size();
-  return fmt::format("{}{}", fmt::join(names, ", "),
-                     more > 0 ? fmt::format(" and {} more", more) : "");
-}
-
 /// What the workers have done, behind their names.
 std::string tried_text(const Cause& cause, const std::string& place) {
   const bool many = cause.workers.size() > 1;
@@ -381,11 +370,18 @@ std::string tried_text(const Cause& cause, const std::string& place) {
 }  // namespace
 
 std::string Answers::store_text(const Cause& cause, const std::string& place) const {
-  return fmt::format("the store has no room for all tiles of {}: they need {}, free {}{}", place,
-                     bytes_text(cause.need_bytes), bytes_text(cause.free_bytes),
-                     cause.jobs.empty() ? ""
-                                        : "; it also holds what is begun of " +
-                                              jobs_text(farm_.history, cause.jobs));
+  std::vector<std::string> holders;
+  for (const Digest& job : cause.jobs) holders.push_back(farm_.history.name_of(job));
+  if (cause.room == Room::enough)
+    return fmt::format("room in the store is left for {}, which comes before {}",
+                       names_text(holders, "job"), place);
+  std::string text = fmt::format("the store has no room for all tiles of {}: they need {}, free {}",
+                                 place, bytes_text(cause.need_bytes), bytes_text(cause.free_bytes));
+  if (cause.ended_bytes > 0)
+    text += fmt::format("; jobs that have ended hold {}", bytes_text(cause.ended_bytes));
+  if (holders.empty()) return text;
+  text += "; it also holds what is begun of " + names_text(holders, "job");
+  return cause.room == Room::beside ? text + ": both at once could not end" : text;
 }
 
 std::string Answers::text_of(const Cause& cause) const {
@@ -409,9 +405,8 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::skipped:
       return fmt::format("and so on, {} times", cause.count);
     case ReasonKind::left_out:
-      return fmt::format("{} {}: it {}", who,
-                         cause.task ? "is not given " + place(cause) : "gets none of its tasks",
-                         cause.text);
+      if (cause.task) return fmt::format("{} {}", who, tried_text(cause, place(cause)));
+      return fmt::format("{} gets none of its tasks: it {}", who, cause.text);
     case ReasonKind::running:
       return fmt::format("{} is with {}", place(cause), who);
     case ReasonKind::no_worker:

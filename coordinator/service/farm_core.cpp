@@ -11,7 +11,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/frame_range.h"
 #include "common/store/folder_token.h"
-#include "coordinator/schedule/reasons.h"
+#include "coordinator/schedule/waits.h"
 #include "coordinator/service/diagnostics_file.h"
 #include "coordinator/service/farm_document.h"
 #include "coordinator/service/job_report.h"

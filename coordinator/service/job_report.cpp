@@ -7,8 +7,9 @@
 #include <utility>
 
 #include "common/base/archive.h"
+#include "common/base/legible.h"
 #include "coordinator/schedule/held_states.h"
-#include "coordinator/schedule/reasons.h"
+#include "coordinator/schedule/waits.h"
 #include "coordinator/service/history.h"
 
 namespace baton {
@@ -26,12 +27,8 @@ std::vector<FrameNumber> finished_frames(const Scheduler::Job& job) {
   return frames;
 }
 
-/// What a failure says, without the command that repeats its task alone.
-std::string_view cause_of(const Failure& failure) {
-  return std::string_view(failure.message).substr(0, failure.message.find("\nto replay it alone"));
-}
-
-/// A line for each worker and cause, in the order in which each came last.
+/// A line for each worker and cause, in the order in which each came last. Behind the first line of
+/// a message stands what is to be done of its task alone.
 std::vector<std::string> describe(const Scheduler::Job& job, const std::vector<Failure>& failures) {
   struct Alike {
     const Failure* last;
@@ -40,7 +37,8 @@ std::vector<std::string> describe(const Scheduler::Job& job, const std::vector<F
   std::vector<Alike> causes;
   for (const Failure& failure : failures) {
     const auto found = std::ranges::find_if(causes, [&](const Alike& alike) {
-      return alike.last->worker == failure.worker && cause_of(*alike.last) == cause_of(failure);
+      return alike.last->worker == failure.worker &&
+             first_line(alike.last->message) == first_line(failure.message);
     });
     std::size_t count = 1;
     if (found != causes.end()) {

@@ -36,7 +36,7 @@ std::string Peers::id_for(const WorkerHello& hello) const {
   const auto other = workers_.find(hello.worker_id);
   if (other == workers_.end() || other->second.hello.instance == hello.instance)
     return hello.worker_id;
-  return fmt::format("{}#{:08x}", hello.worker_id, static_cast<std::uint32_t>(hello.instance));
+  return hello.own_name();
 }
 
 bool Peers::is_of_another(const std::string& worker, const std::string& bearer) const {

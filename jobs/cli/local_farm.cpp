@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -86,16 +85,12 @@ Result<FileDescriptor> LocalFarm::lock_directory(const fs::path& directory) {
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot create: {}", directory.string(), error.message())};
 
-  const fs::path path = directory / "lock";
-  FileDescriptor lock(::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600));
-  if (!lock)
-    return Error{ErrorKind::io,
-                 fmt::format("{}: cannot open: {}", path.string(), std::strerror(errno))};
-  if (::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) {
+  BATON_ASSIGN(std::optional<FileDescriptor> lock, try_lock_file(directory / "lock"));
+  if (!lock) {
     return Error{ErrorKind::io,
                  fmt::format("{}: another `baton render` works here", directory.string())};
   }
-  return lock;
+  return std::move(*lock);
 }
 
 Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {

@@ -221,6 +221,20 @@ def what_workers_say_is_joined_with_what_happened(programs, folder):
         check_equal((farm.work_folder / "logs").stat().st_mode & 0o077, 0, "rights of others in the logs")
 
 
+def workers_of_one_name_have_logs_of_their_own(programs, folder):
+    with Farm(programs, folder / "farm", workers=0) as farm:
+        for _ in range(2):
+            farm.start_worker(name="w")
+        wait_until(lambda: len(listed_workers(farm)) == 2, "both are there")
+        job = farm.submit(small_job(folder))
+        farm.wait_for(job)
+        done = [row["worker"] for row in map(json.loads, farm.baton("job", "log", job, "--json").stdout.splitlines())
+                if row.get("kind") == "task done"]
+        said = [row["worker"] for row in map(json.loads, farm.baton("job", "log", job, "--json").stdout.splitlines())
+                if "level" in row and row["text"].endswith(": done")]
+        check_equal(sorted(said), sorted(done), "who says that it is done is who has done it")
+
+
 def frames_are_rendered_once_more(programs, folder):
     """What it takes is said before, a person or --yes says so, and the frames are the same."""
     with Farm(programs, folder / "farm", workers=1) as farm:

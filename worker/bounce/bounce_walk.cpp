@@ -5,26 +5,13 @@
 #include <cmath>
 
 #include "common/base/poison.h"
-#include "common/math/low_discrepancy.h"
-#include "worker/surface/scene_kernels.h"
+#include "worker/bounce/surface_light.h"
 
 namespace baton {
-
-/// One candidate of a surface: where light comes from, and how much over the density of all ways to
-/// draw it: reflected, and before that.
-struct BounceCandidate {
-  Vec3 direction;
-  Rgb value, arriving;
-  float weight = 0;  ///< mean of the value
-};
-
 namespace {
 
-/// Surfaces that are worked on together: lanes for the kernels, and their targets stay in the
-/// cache.
-constexpr std::size_t kBlock = 64;
-/// Candidates of a surface from the presampled light: a block of it, an eighth of the light each.
-constexpr std::size_t kFromLight = PresampledLight::kBlock;
+/// Surfaces that are worked on together: lanes for the kernels, and they stay in the cache.
+constexpr std::size_t kBlock = SurfaceLight::kMost;
 /// Width of the cone that textures are averaged over, as a share of the distance between two paths
 /// of a pixel: neighbours overlap by little, and what is blurred stays below what their noise
 /// hides.
@@ -32,68 +19,8 @@ constexpr float kConeShare = 0.125f;
 /// Paths that carry more than this share of their first piece's light never end early.
 constexpr float kSurelyKept = 0.5f;
 
-/// Random numbers of a path at a surface.
+/// Indices of a path's random numbers at a surface.
 enum Draw : std::uint32_t { kChoose, kLobe };
-
-/// Steps of PassId::bounce before those of surfaces.
-enum FirstStep : std::uint32_t { kScramble, kScrambleAside, kShift };
-/// The step of a path's surface. bounce: from 1.
-std::uint32_t step_at(std::int32_t bounce, std::uint32_t path) {
-  return static_cast<std::uint32_t>(bounce) * BounceWalk::kPaths + path;
-}
-
-template <std::size_t kSize>
-struct Directions {
-  std::array<float, kSize> x, y, z;
-
-  Vec3 operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
-};
-template <std::size_t kSize>
-struct Colors {
-  std::array<float, kSize> r, g, b;
-
-  Rgb operator[](std::size_t i) const { return {r[i], g[i], b[i]}; }
-};
-/// (surface, direction) pairs, and what surfaces make of light from there.
-template <std::size_t kSize>
-struct Pairs {
-  std::array<std::int32_t, kSize> site;
-  Directions<kSize> direction;
-  Colors<kSize> reflected;  ///< BRDF times cosine
-  std::array<float, kSize> density;
-  std::array<float, kSize> u0, u1;  ///< that directions are drawn with
-  std::size_t count;
-
-  Pairs() {
-    poison(*this);
-    count = 0;
-  }
-  void add(std::size_t at, const Vec3& way) {
-    site[count] = static_cast<std::int32_t>(at);
-    direction.x[count] = way.x;
-    direction.y[count] = way.y;
-    direction.z[count++] = way.z;
-  }
-  void add(std::size_t at, float u, float v) {
-    site[count] = static_cast<std::int32_t>(at);
-    u0[count] = u;
-    u1[count++] = v;
-  }
-  template <class T>
-  std::span<T> used(std::array<T, kSize>& column) {
-    return std::span(column).first(count);
-  }
-  /// Directions of the BRDFs, by u0 and u1.
-  void draw(const SiteBlock& sites) {
-    kernels::sample_bsdf(sites, used(site), used(u0), used(u1), used(direction.x),
-                         used(direction.y), used(direction.z));
-  }
-  void evaluate(const SiteBlock& sites) {
-    kernels::evaluate_bsdf(sites, used(site), used(direction.x), used(direction.y),
-                           used(direction.z), used(reflected.r), used(reflected.g),
-                           used(reflected.b), used(density));
-  }
-};
 
 /// Least alpha of what is seen through scattering of such a density at least: what Cycles' filter
 /// of glossy surfaces makes of it at its default, 1.
@@ -105,17 +32,6 @@ void roughen(Material& material, float alpha) {
   if (material.lobe == Material::Lobe::phong && alpha > 0)
     material.shape = std::min(material.shape, 2 / (alpha * alpha) - 2);
   if (material.coat.weight > 0) material.coat.alpha = std::max(material.coat.alpha, alpha);
-}
-
-using Candidate = BounceCandidate;
-
-Candidate candidate(const Vec3& direction, const Rgb& reflected, const Rgb& radiance,
-                    float light_density, float own_density) {
-  const float density = static_cast<float>(kFromLight) * std::abs(light_density) + own_density;
-  if (!(density > 0)) return {};
-  const Rgb arriving = radiance / density;
-  const Rgb value = reflected * arriving;
-  return {direction, value, arriving, mean(value)};
 }
 
 /// Alpha from which on a lobe's paths are worth sharing.
@@ -137,7 +53,8 @@ bool is_sharp(const SiteBlock& sites) {
 }
 
 /// What a surface reflects alike to all sides of all that it reflects: the albedo of a Lambertian
-/// surface about the mesh's normal. It depends on nothing but the place: not on who looks.
+/// surface about the mesh's normal. It depends on the place alone (and on the width that textures
+/// are averaged over): not on who looks.
 Rgb alike_albedo(const Material& material) {
   switch (material.lobe) {
     case Material::Lobe::none:
@@ -150,6 +67,24 @@ Rgb alike_albedo(const Material& material) {
   }
   return {};
 }
+
+/// The sites of a pixel that its paths start from, in turn.
+class Turns {
+ public:
+  Turns(const BounceStart& start, std::uint32_t paths)
+      : shift_(uniform_float(bounce_bits(start.key, BounceStep::shift)[0])),
+        scale_(static_cast<float>(start.hits.size()) / static_cast<float>(paths)),
+        last_(start.hits.size() - 1) {}
+  std::size_t operator[](std::uint32_t path) const {
+    return std::min(static_cast<std::size_t>((static_cast<float>(path) + shift_) * scale_), last_);
+  }
+
+ private:
+  float shift_, scale_;
+  std::size_t last_;
+};
+
+bool sees_surface(const SurfaceHit& hit) { return hit.hit && !hit.is_catcher; }
 
 }  // namespace
 
@@ -174,46 +109,6 @@ struct BounceWalk::Surfaces {
 Rng BounceWalk::random_of(const Path& path) const {
   return {starts_[path.start].key, PassId::bounce};
 }
-
-namespace {
-
-/// Owen-scrambled points of a sequence that belongs to a pixel or block and frame: its rounds
-/// follow each other in it.
-class Points {
- public:
-  Points(RngKey key, bool is_aside, std::uint32_t number = 0) {
-    key.round = 0;
-    scramble_ = Rng(key, PassId::bounce).bits(is_aside ? kScrambleAside : kScramble, number);
-  }
-  std::array<float, 2> operator[](std::uint32_t index) const {
-    const auto point = sobol_2d(index);
-    return {uniform_float(owen_scramble(point[0], scramble_[0])),
-            uniform_float(owen_scramble(point[1], scramble_[1]))};
-  }
-
- private:
-  Philox4x32::Counter scramble_;
-};
-
-/// The sites of a pixel that its paths start from, in turn.
-class Turns {
- public:
-  Turns(const BounceStart& start, std::uint32_t paths)
-      : shift_(uniform_float(Rng(start.key, PassId::bounce).bits(kShift, 0)[0])),
-        scale_(static_cast<float>(start.hits.size()) / static_cast<float>(paths)),
-        last_(start.hits.size() - 1) {}
-  std::size_t operator[](std::uint32_t path) const {
-    return std::min(static_cast<std::size_t>((static_cast<float>(path) + shift_) * scale_), last_);
-  }
-
- private:
-  float shift_, scale_;
-  std::size_t last_;
-};
-
-bool sees_surface(const SurfaceHit& hit) { return hit.hit && !hit.is_catcher; }
-
-}  // namespace
 
 void BounceWalk::push_path(std::uint32_t pixel, const SurfaceHit& hit, const Vec3& direction,
                            float pdf, std::uint32_t number, const Rgb& weight, Kind kind) {
@@ -246,9 +141,9 @@ void BounceWalk::add(std::uint32_t pixel, const BounceStart& start) {
 /// Paths that belong to the pixel alone, from that number on.
 void BounceWalk::add_own(std::uint32_t pixel, const BounceStart& start, std::uint32_t first_path,
                          Kind kind) {
-  const Points points(start.key, start.is_aside);
+  const BouncePoints points(start.key, start.is_aside);
   const Turns turns(start, kPaths - first_path);
-  Pairs<kPaths> first;
+  SurfacePairs<kPaths> first;
   std::array<std::uint32_t, kPaths> number;
   for (std::uint32_t k = first_path; k < kPaths; ++k) {
     const std::size_t site = turns[k - first_path];
@@ -266,19 +161,6 @@ void BounceWalk::add_own(std::uint32_t pixel, const BounceStart& start, std::uin
     push_path(pixel, start.hits[static_cast<std::size_t>(first.site[i])], first.direction[i], pdf,
               number[i], reflected / (pdf * static_cast<float>(kPaths)), kind);
   }
-}
-
-BounceGroup BounceGroup::of(std::uint64_t job_seed, std::int32_t frame, std::int32_t image_width,
-                            std::int32_t x, std::int32_t y, std::int32_t round) {
-  constexpr std::int32_t kLast = limits::kBounceBlock - 1;
-  const RngKey block = pixel_key(job_seed, frame, image_width, x & ~kLast, y & ~kLast, round);
-  const Philox4x32::Counter shift = Rng(block, PassId::bounce).bits(kShift, 0);
-  const auto square = [](std::int32_t at, std::uint32_t by) {
-    return ((static_cast<std::uint32_t>(at) + by) & kLast) / kSide;
-  };
-  return {.block = block,
-          .number = 2 * square(y, shift[1]) + square(x, shift[0]),
-          .member = static_cast<std::uint32_t>((y & (kSide - 1)) * kSide + (x & (kSide - 1)))};
 }
 
 BounceWalk::Exchange& BounceWalk::exchange_of(const BounceStart& start, std::uint32_t path) {
@@ -301,10 +183,10 @@ BounceWalk::Exchange& BounceWalk::exchange_of(const BounceStart& start, std::uin
 void BounceWalk::add_member(std::uint32_t pixel, const BounceStart& start) {
   constexpr std::uint32_t kMembers = BounceGroup::kMembers;
   const BounceGroup& group = start.group;
-  const Points points(group.block, start.is_aside, group.number);
+  const BouncePoints points(group.block, start.is_aside, group.number);
   const Turns turns(start, kSharedPaths);
   const SiteBlock& sites = start.sites;
-  Pairs<kSharedPaths> first;
+  SurfacePairs<kSharedPaths> first;
   std::array<std::uint32_t, kSharedPaths> number;
   for (std::uint32_t k = 0; k < kSharedPaths; ++k) {
     const std::size_t site = turns[k];
@@ -383,8 +265,8 @@ void BounceWalk::follow(const EnvironmentView& light, std::span<Rgb> found) {
 void BounceWalk::share(const Exchange& exchange, std::span<Rgb> found) {
   constexpr std::size_t kMost = BounceGroup::kMembers;
   const std::span<const Member> members = exchange.members;
-  // Who sees what: pairs in the order of the surfaces, their finders first.
-  Pairs<kMost * kMost> pairs;
+  // Who may see what: pairs in the order of the surfaces.
+  SurfacePairs<kMost * kMost> pairs;
   std::array<float, kMost * kMost> measure;  // cos / d^2 at the surface
   std::array<std::size_t, kMost + 1> end;
   std::array<const First*, kMost> met;
@@ -395,22 +277,20 @@ void BounceWalk::share(const Exchange& exchange, std::span<Rgb> found) {
     const First& first = firsts_[static_cast<std::size_t>(finder.first)];
     if (!(mean(first.shared) > 0)) continue;
     met[num_met] = &first;
-    const auto add = [&](std::size_t i) {
+    for (std::size_t i = 0; i < members.size(); ++i) {
       const Vec3 way = first.origin - members[i].origin;
       const float facing = -dot(way, first.ng), d2 = dot(way, way);
-      if (!(facing > 0 && d2 > 0)) return;
+      if (!(facing > 0 && d2 > 0)) continue;
       const float inverse = 1 / std::sqrt(d2);
       measure[pairs.count] = facing * inverse / d2;
       pairs.add(i, way * inverse);
       shadows_.push(members[i].origin, way);
       shadows_.t_far[shadows_.size() - 1] = 1;
-    };
-    for (std::size_t i = 0; i < members.size(); ++i) add(i);
+    }
     end[num_met++] = pairs.count;
   }
   if (pairs.count == 0) return;
   pairs.evaluate(exchange.sites);
-  // Its finder sees a surface.
   geometry_.accel->occluded(shadows_);
   num_rays_ += shadows_.size();
 
@@ -421,7 +301,7 @@ void BounceWalk::share(const Exchange& exchange, std::span<Rgb> found) {
       const Member& member = members[static_cast<std::size_t>(pairs.site[n])];
       const bool is_finder =
           member.first >= 0 && &firsts_[static_cast<std::size_t>(member.first)] == met[m];
-      // A path is drawn where it reflects something.
+      // A path is drawn where it reflects something, and its finder sees a surface.
       const bool draws = mean(pairs.reflected[n]) > 0;
       if (!draws || (!is_finder && shadows_.t_far[n] < 0)) measure[n] = 0;
       sum += measure[n] * pairs.density[n];
@@ -478,73 +358,15 @@ void BounceWalk::shade(std::span<const std::size_t> met, std::int32_t bounce,
   if (bounce < spec_.bounces) go_on(at, bounce);
 }
 
-namespace {
-
-/// Candidates of the light of some surfaces.
-struct LightCandidates {
-  /// All of a surface; value 0 where it has none of its BRDF.
-  using OfSurface = std::array<Candidate, kFromLight + 1>;
-
-  Pairs<kBlock * kFromLight> from_light;
-  Colors<kBlock * kFromLight> radiance;
-  std::array<float, kBlock * kFromLight> density;
-  Pairs<kBlock> own;  ///< of the BRDF
-  Colors<kBlock> own_radiance;
-  std::array<float, kBlock> own_density;
-  std::array<std::size_t, kBlock> place_of_own;
-
-  /// Those of surface i, the next one. u: of the BRDF.
-  void add(const SiteBlock& sites, std::size_t i, const PresampledLight::Block& block,
-           const std::array<float, 2>& u) {
-    for (std::size_t c = 0; c < kFromLight; ++c) {
-      const std::size_t n = from_light.count;
-      radiance.r[n] = block.r[c];
-      radiance.g[n] = block.g[c];
-      radiance.b[n] = block.b[c];
-      density[n] = block.density[c];
-      from_light.add(i, {block.x[c], block.y[c], block.z[c]});
-    }
-    if (!(sites.specular_probability[i] > 0)) return;
-    place_of_own[i] = own.count;
-    own.add(i, u[0], u[1]);
-  }
-  void evaluate(const SiteBlock& sites, const EnvironmentView& light) {
-    from_light.evaluate(sites);
-    if (own.count == 0) return;
-    own.draw(sites);
-    own.evaluate(sites);
-    kernels::evaluate_environment(light, own.used(own.direction.x), own.used(own.direction.y),
-                                  own.used(own.direction.z), own.used(own_radiance.r),
-                                  own.used(own_radiance.g), own.used(own_radiance.b),
-                                  own.used(own_density));
-  }
-  /// After evaluate.
-  OfSurface of(const SiteBlock& sites, std::size_t i) const {
-    OfSurface all;
-    const bool is_glossy = sites.specular_probability[i] > 0;
-    for (std::size_t c = 0; c < kFromLight; ++c) {
-      const std::size_t n = i * kFromLight + c;
-      all[c] = candidate(from_light.direction[n], from_light.reflected[n], radiance[n], density[n],
-                         is_glossy ? from_light.density[n] : 0);
-    }
-    if (!is_glossy) return all;
-    const std::size_t n = place_of_own[i];
-    all[kFromLight] = candidate(own.direction[n], own.reflected[n], own_radiance[n], own_density[n],
-                                own.density[n]);
-    return all;
-  }
-};
-
-}  // namespace
-
 /// Shadow rays to some of the light.
 void BounceWalk::light_up(const Surfaces& at, std::int32_t bounce, const EnvironmentView& light) {
   if (starts_[paths_[at.path[0]].start].presampled->empty()) return;  // a black map
-  LightCandidates candidates;
+  SurfaceLight candidates;
   std::array<float, kBlock> choice;
   for (std::size_t i = 0; i < at.count; ++i) {
     const Path& path = paths_[at.path[i]];
-    const Philox4x32::Counter bits = random_of(path).bits(step_at(bounce, path.number), kChoose);
+    const Philox4x32::Counter bits =
+        random_of(path).bits(bounce_step(bounce, path.number), kChoose);
     choice[i] = uniform_float(bits[1]);
     candidates.add(at.sites, i,
                    starts_[path.start].presampled->blocks[bits[0] % PresampledLight::kNumBlocks],
@@ -557,10 +379,10 @@ void BounceWalk::light_up(const Surfaces& at, std::int32_t bounce, const Environ
 
 /// Traces some candidates of surface i, drawn systematically in proportion to what they bring. u:
 /// uniform in [0, 1).
-void BounceWalk::keep_some(const Surfaces& at, std::size_t i, std::span<const Candidate> candidates,
-                           float u) {
+void BounceWalk::keep_some(const Surfaces& at, std::size_t i,
+                           std::span<const SurfaceCandidate> candidates, float u) {
   float total = 0;
-  for (const Candidate& one : candidates) total += one.weight;
+  for (const SurfaceCandidate& one : candidates) total += one.weight;
   if (!(total > 0) || !std::isfinite(total)) return;
   const Path& path = paths_[at.path[i]];
   const bool is_shared = at.is_shared(i);
@@ -572,7 +394,7 @@ void BounceWalk::keep_some(const Surfaces& at, std::size_t i, std::span<const Ca
   for (int ray = 0; ray < num_rays; ++ray) {
     const float place = (static_cast<float>(ray) + u) * share;
     while (passed <= place && c + 1 < candidates.size()) passed += candidates[++c].weight;
-    const Candidate& chosen = candidates[c];
+    const SurfaceCandidate& chosen = candidates[c];
     if (!(chosen.weight > 0)) continue;  // rounding, at the end of the line
     shadows_.push(hits_[at.path[i]].ray_origin, chosen.direction);
     const float scale = share / chosen.weight;
@@ -586,12 +408,11 @@ void BounceWalk::keep_some(const Surfaces& at, std::size_t i, std::span<const Ca
 
 /// The next directions of the paths that go on.
 void BounceWalk::go_on(const Surfaces& at, std::int32_t bounce) {
-  Pairs<kBlock> on;
+  SurfacePairs<kBlock> on;
   std::array<float, kBlock> survival;
   for (std::size_t i = 0; i < at.count; ++i) {
     const Path& path = paths_[at.path[i]];
-    const auto u =
-        random_of(path).uniforms(16 * static_cast<std::uint32_t>(bounce) + path.number, kLobe);
+    const auto u = random_of(path).uniforms(bounce_step(bounce, path.number), kLobe);
     on.add(i, u[0], u[1]);
     survival[i] = u[2];
   }

@@ -5,34 +5,14 @@
 #include <span>
 #include <vector>
 
-#include "common/base/limits.h"
 #include "common/job/job_spec.h"
-#include "common/math/philox.h"
 #include "worker/accel/geometry_sequence.h"
+#include "worker/bounce/bounce_group.h"
 #include "worker/light/presampled_light.h"
 
 namespace baton {
 
-struct BounceCandidate;
-
-/// Pixels that share what their paths find: a square of 4 x 4 in a block of the picture, which goes
-/// on at the block's other edges and lies elsewhere in each round.
-struct BounceGroup {
-  static constexpr std::int32_t kSide = limits::kBounceBlock / 2;
-  static constexpr std::uint32_t kMembers = kSide * kSide, kGroups = 4;
-
-  RngKey block;              ///< of the block's first pixel
-  std::uint32_t number = 0;  ///< [0, kGroups)
-  /// [0, kMembers), another one for each pixel of a group: the same in all rounds.
-  std::uint32_t member = 0;
-
-  /// That of pixel (x, y) of an image. Other arguments as of pixel_key.
-  static BounceGroup of(std::uint64_t job_seed, std::int32_t frame, std::int32_t image_width,
-                        std::int32_t x, std::int32_t y, std::int32_t round);
-  bool is_same(const BounceGroup& b) const {
-    return block.pixel == b.block.pixel && number == b.number;
-  }
-};
+struct SurfaceCandidate;
 
 /// What a pixel's paths begin with.
 struct BounceStart {
@@ -145,7 +125,7 @@ class BounceWalk {
   Exchange& exchange_of(const BounceStart& start, std::uint32_t path);
   void shade(std::span<const std::size_t> met, std::int32_t bounce, const EnvironmentView& light);
   void light_up(const Surfaces& at, std::int32_t bounce, const EnvironmentView& light);
-  void keep_some(const Surfaces& at, std::size_t i, std::span<const BounceCandidate> candidates,
+  void keep_some(const Surfaces& at, std::size_t i, std::span<const SurfaceCandidate> candidates,
                  float u);
   void go_on(const Surfaces& at, std::int32_t bounce);
   void share(const Exchange& exchange, std::span<Rgb> found);

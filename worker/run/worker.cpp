@@ -1,9 +1,7 @@
 #include "worker/run/worker.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <array>
@@ -58,28 +56,28 @@ std::string name_of_worker(const WorkerOptions& options) {
                                    : options.worker_id;
 }
 
-/// Tells processes of one name apart. Host and process id do not tell containers apart.
-std::uint64_t draw_instance() {
-  std::random_device random;
-  return std::uint64_t{random()} << 32 | random();
-}
-
-SessionOptions session_options(const WorkerOptions& options, std::uint64_t instance) {
+WorkerHello identity_of(const WorkerOptions& options) {
   WorkerHello identity;
   identity.host = host_name();
   identity.pid = static_cast<std::int32_t>(::getpid());
-  identity.instance = instance;
+  // Host and process id do not tell containers apart.
+  std::random_device random;
+  identity.instance = std::uint64_t{random()} << 32 | random();
   identity.worker_id = name_of_worker(options);
   identity.num_threads = options.num_threads;
   identity.build = build_identity();
   identity.renderer = describe_renderer();
+  return identity;
+}
+
+SessionOptions session_options(const WorkerOptions& options, const WorkerHello& identity) {
   std::optional<TimePoint> end_at;
   if (options.end_at) {
     end_at =
         std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::milliseconds>(
                                                *options.end_at - std::chrono::system_clock::now());
   }
-  return {std::move(identity), options.give_up, end_at, options.idle_exit, options.drain};
+  return {identity, options.give_up, end_at, options.idle_exit, options.drain};
 }
 
 /// Saves the job where a replay can read it. Returns the command that repeats the task: up to the
@@ -228,8 +226,8 @@ class Worker {
  public:
   Worker(WorkerChannel channel, const WorkerOptions& options)
       : channel_(std::move(channel)),
-        session_(session_options(options, instance_), now()),
-        worker_id_(name_of_worker(options)),
+        identity_(identity_of(options)),
+        session_(session_options(options, identity_), now()),
         machine_(options.machine),
         jobs_(
             [this](const JobDocument& document) {
@@ -366,7 +364,7 @@ class Worker {
       const std::filesystem::path file = own_log(folder.parent_path());
       if (const Status opened = log_to_file(file); !opened)
         spdlog::warn("no log for `baton job log`: {}", opened.error().message);
-      if (const Status opened = trace_to_file(trace_beside(file), worker_id_); !opened)
+      if (const Status opened = trace_to_file(trace_beside(file), identity_.worker_id); !opened)
         spdlog::warn("no trace for `baton job trace`: {}", opened.error().message);
     }
     spdlog::info("the coordinator has answered, blobs are in {}", folder.string());
@@ -374,16 +372,13 @@ class Worker {
   /// The log of its name; where another process writes that, one of its own, named as the
   /// coordinator tells the two apart.
   std::filesystem::path own_log(const std::filesystem::path& work_folder) {
-    const std::filesystem::path file = worker_log(work_folder, worker_id_);
+    const std::filesystem::path file = worker_log(work_folder, identity_.worker_id);
     std::error_code error;
     std::filesystem::create_directories(file.parent_path(), error);
-    const std::filesystem::path lock = file.parent_path() / ("." + file.stem().string() + ".lock");
-    log_lock_ = FileDescriptor(
-        ::open(lock.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR));
-    if (!log_lock_ || ::flock(log_lock_.number(), LOCK_EX | LOCK_NB) == 0) return file;
-    const std::string id =
-        fmt::format("{}#{:08x}", worker_id_, static_cast<std::uint32_t>(instance_));
-    return worker_log(work_folder, id);
+    auto lock = try_lock_file(file.parent_path() / ("." + file.stem().string() + ".lock"));
+    if (lock && !*lock) return worker_log(work_folder, identity_.own_name());
+    if (lock) log_lock_ = std::move(*lock);
+    return file;
   }
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.grant.lease.job);
@@ -453,10 +448,9 @@ class Worker {
   }
 
   WorkerChannel channel_;
-  const std::uint64_t instance_ = draw_instance();
+  const WorkerHello identity_;
   Session session_;
-  const std::string worker_id_;
-  FileDescriptor log_lock_{-1};
+  std::optional<FileDescriptor> log_lock_;
   const Machine machine_;
   AssetShelf shelf_;  ///< what jobs_ loads from
   JobCache jobs_;

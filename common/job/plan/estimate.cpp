@@ -63,10 +63,10 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling) * e.rounds;
   if (job.light.bounces > 0) {
     // Paths, each with its shadow rays; those that are shared with some more, and to all members.
-    constexpr int kMembers = limits::kBounceBlock * limits::kBounceBlock / 4;
     constexpr int kOfPath = limits::kBouncePaths * (1 + limits::kBounceRays);
-    constexpr int kShared = limits::kSharedBouncePaths *
-                            (kMembers - 1 + limits::kSharedBounceRays - limits::kBounceRays);
+    constexpr int kShared =
+        limits::kSharedBouncePaths *
+        (limits::kBounceMembers - 1 + limits::kSharedBounceRays - limits::kBounceRays);
     e.shadow_rays_per_pixel += e.rounds * (job.light.bounces * kOfPath + kShared);
   }
   if (draws_twice(job)) e.shadow_rays_per_pixel *= 2;

@@ -95,13 +95,16 @@ std::vector<std::int64_t> states_at_once(const JobSpec& job) {
   return ends;
 }
 
-/// Frames whose films stay for another sweep, of this job or a later one.
-std::int64_t frames_that_stay(const JobSpec& job) {
+}  // namespace
+
+std::int64_t num_state_sets(const JobSpec& job) {
+  return carries_state(job) ? static_cast<std::int64_t>(states_at_once(job).size()) : 0;
+}
+
+std::int64_t num_films_that_stay(const JobSpec& job) {
   const bool stay = job.quality.sweeps > 1 || job.quality.refinable;
   return stay ? static_cast<std::int64_t>(job.frames.size()) : 0;
 }
-
-}  // namespace
 
 StoreEstimate estimate_store(const JobSpec& job, double surface_share) {
   StoreEstimate store;
@@ -121,7 +124,7 @@ StoreEstimate estimate_store(const JobSpec& job, double surface_share) {
   const bool second = job.visibility.correlated;
   const double run = frames_per_run(job);
   const double ahead = std::max(std::min(frames, run * (1 + tiles_ahead / (second ? 2 : 1))),
-                                static_cast<double>(frames_that_stay(job)));
+                                static_cast<double>(num_films_that_stay(job)));
   store.films =
       static_cast<std::int64_t>(pixels * ahead * film_bytes_per_pixel(job, surface_share));
   if (second) {
@@ -141,11 +144,10 @@ StoreEstimate bound_store(const JobSpec& job) {
   // In motion, what workers read of each other stays until the next checkpoint.
   const std::int64_t between =
       shares_history(job) && job.state.keep == StateKeep::last ? job.state.checkpoint_every - 1 : 0;
-  const std::int64_t kept =
-      carries_state(job) ? static_cast<std::int64_t>(states_at_once(job).size()) + between : 0;
+  const std::int64_t kept = carries_state(job) ? num_state_sets(job) + between : 0;
   StoreEstimate store;
   store.states = e.state_bytes * std::min(kept + kStatesInWork, e.runs);
-  store.films = e.film_bytes * (ahead + frames_that_stay(job));
+  store.films = e.film_bytes * (ahead + num_films_that_stay(job));
   if (job.visibility.correlated) {
     store.films *= 2;  // each pass has its films
     const std::int64_t per_pixel = 2 + 8 + 10 * std::int64_t{job.sampling.num_particles};

@@ -24,6 +24,12 @@ StoreEstimate estimate_store(const JobSpec& job, double surface_share);
 /// What is in it at most, however many workers there are and however badly blobs pack.
 StoreEstimate bound_store(const JobSpec& job);
 
+/// How many states of each tile stay in the store between runs, but for those that workers read of
+/// each other in motion; 0 where none are carried.
+std::int64_t num_state_sets(const JobSpec& job);
+/// Frames whose films stay for another sweep, of this job or a later one.
+std::int64_t num_films_that_stay(const JobSpec& job);
+
 /// What a blob of a whole tile takes, as it is likely; all pixels see a surface.
 std::int64_t estimate_blob_bytes(const JobSpec& job, BlobKind kind);
 

@@ -103,6 +103,17 @@ void idle_camera_warnings(const CameraSpec& camera, std::vector<std::string>& wa
   look("up", &CameraSpec::up, &CameraKey::up);
 }
 
+/// What of light between surfaces says nothing here, and what it leaves out.
+void bounce_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
+  if (job.light.bounces == 0 && job.light.filter_glossy != LightSpec().filter_glossy)
+    warnings.push_back("light.filterGlossy: no effect, as light.bounces is 0");
+  if (const std::string key = catcher_key(job); job.light.bounces > 0 && !key.empty())
+    warnings.push_back(fmt::format(
+        "light.bounces: {}: what catches shadows neither reflects light between surfaces, nor "
+        "receives it",
+        key));
+}
+
 /// Values of `output` that say nothing here.
 void idle_output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
   if (job.output.plate && !has_plate(job.output))
@@ -137,6 +148,7 @@ void text_warnings(const JobSpec& job, bool light_jumps, const std::function<dou
   append(limit_warnings(job, light_jumps), warnings);
   append(scene_warnings(job.scene), warnings);
   aov_warnings(job, warnings);
+  bounce_warnings(job, warnings);
   idle_camera_warnings(job.camera, warnings);
   idle_output_warnings(job, warnings);
   output_warnings(job, share, warnings);

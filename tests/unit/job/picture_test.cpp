@@ -49,6 +49,21 @@ TEST(Picture, NamesWhatDecidesPixelsAlone) {
   EXPECT_EQ(picture_differences(plain, document(R"("frames": "2-8")")).size(), 1u);
 }
 
+// Jobs from before light between surfaces are the pictures that they were.
+TEST(Picture, LightBetweenSurfacesIsNamedWhereThereIsSome) {
+  const auto document = [](const std::string& keys) {
+    const JobSpec job = job_with(keys);
+    return ParsedJobDocument{
+        .job = job, .assets = {}, .digest = {}, .picture = picture_digest(job, {})};
+  };
+  const ParsedJobDocument plain = document(""), lit = document(R"("light": {"bounces": 2})");
+  EXPECT_TRUE(picture_differences(plain, document(R"("light": {"filterGlossy": false})")).empty());
+  EXPECT_EQ(picture_differences(plain, lit),
+            (std::vector<std::string>{"$.light.bounces", "$.light.filterGlossy"}));
+  EXPECT_EQ(picture_differences(lit, document(R"("light": {"bounces": 2, "filterGlossy": false})")),
+            std::vector{std::string("$.light.filterGlossy")});
+}
+
 // A plate is laid under what is rendered: other plates make other frames of the same films.
 TEST(Picture, PlatesBelongToFramesAlone) {
   const auto document = [](const std::string& output, const Digest& second) {

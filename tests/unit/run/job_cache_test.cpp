@@ -238,6 +238,19 @@ TEST(JobCache, ADocumentOfAnotherJobIsRefused) {
   EXPECT_FALSE(job);
 }
 
+// The coordinator has let it in; another worker may see it.
+TEST(JobCache, AJobOutsideTheRootsOfAWorkerIsNotSeenByIt) {
+  const std::string json = make_job_document(test::box_job()).value();
+  AssetShelf shelf;
+  const Machine machine{.roots = {"/nonexistent"}};
+  const Digest digest = parse_job_document(json).value().digest;
+  const Result<LoadedJobPtr> job = load_job_document({digest, json}, machine, shelf);
+  ASSERT_TRUE(job) << job.error().message;
+  EXPECT_NE((*job)->unseen.find("lies outside what this farm allows (--root): /nonexistent"),
+            std::string::npos)
+      << (*job)->unseen;
+}
+
 TEST(AssetShelf, JobsOfOneSceneShareItWhileOneOfThemLives) {
   JobSpec job = test::box_job();
   const std::vector<KnownAsset> files{{{"map.exr", {1, 2}}, {}}};

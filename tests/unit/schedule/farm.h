@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <map>
 #include <set>
 #include <string>
@@ -130,6 +131,12 @@ class StoredStates {
  private:
   std::map<Digest, int> steps_;
 };
+
+/// Of random farms: 1,000, or as the environment says: 20,000 are some ten million events.
+inline std::uint32_t num_seeds() {
+  const char* const text = std::getenv("BATON_MODEL_SEEDS");
+  return text != nullptr ? static_cast<std::uint32_t>(std::strtoul(text, nullptr, 10)) : 1000;
+}
 
 inline TaskKey render(int run, int tile) { return render_task(Run(run), tile); }
 inline TaskKey assemble(int frame) { return assemble_task(FrameIndex(frame)); }

@@ -74,56 +74,76 @@ TEST_F(PolicyTest, ATaskIsGivenUpWhenNobodyIsLeft) {
   EXPECT_TRUE(is_exhausted(connected, {{"a", {1, true}}}, 2)) << "the only one can do no more";
 }
 
-// Two tiles, four frames in runs of two; a film takes 10 bytes and a state 20.
-TEST(StoreRoom, ARunIsBegunWhenAllOfItFits) {
-  const JobSpec spec = small_job(2, 4, 2);
-  const JobGraph graph(spec);
-  const TaskBook book(graph);
-  BlobSizes sizes(spec);
-  sizes.learn({{BlobKind::film, 0, 0, {}, 10}, {BlobKind::state, 1, 0, {}, 20}});
-  const TaskIndex first = *graph.find(render(0, 0)), later = *graph.find(render(1, 0));
-  const JobInStore fresh{graph, book, sizes, baton::Run(0)};
-  EXPECT_EQ(unmade_bytes(fresh, baton::Run(1)), 2u * (20 + 2 * 10));
+/// Two tiles, four frames in runs of two; a film takes 10 bytes and a state 20: a run makes 80, of
+/// which 40 stay.
+struct StoreRoomTest : testing::Test {
+  JobSpec spec = small_job(2, 4, 2);
+  JobGraph graph{spec};
+  TaskBook book{graph};
+  BlobSizes sizes{spec};
+  TaskIndex first = *graph.find(render(0, 0)), later = *graph.find(render(1, 0));
 
+  StoreRoomTest() {
+    sizes.learn({{BlobKind::film, 0, 0, {}, 10}, {BlobKind::state, 1, 0, {}, 20}});
+  }
+  JobInStore fresh() const { return {spec, graph, book, sizes, baton::Run(0)}; }
+  JobInStore begun() const { return {spec, graph, book, sizes, baton::Run(1)}; }
+};
+
+TEST_F(StoreRoomTest, ARunIsBegunWhenAllOfItFits) {
+  EXPECT_EQ(unmade_bytes(fresh(), baton::Run(1)), 2u * (20 + 2 * 10));
   StoreRoom room{.limit = 80, .is_idle = false};
-  EXPECT_TRUE(has_room(room, fresh, {}, first, false));
-  EXPECT_FALSE(has_room(room, fresh, {}, first, /*others_wait=*/true));
-  EXPECT_FALSE(has_room(room, fresh, {}, later, false)) << "with the first run it is too much";
-  room.used = 1;
-  EXPECT_FALSE(has_room(room, fresh, {}, first, false));
+  EXPECT_EQ(room_for(room, fresh(), {}, first, Room::enough), Room::enough);
+  EXPECT_EQ(room_for(room, fresh(), {}, first, Room::too_little), Room::too_little);
   room.is_idle = true;
-  EXPECT_FALSE(has_room(room, fresh, {}, first, false)) << "it would stand still with most of it";
-  EXPECT_TRUE(has_room({.limit = 81, .used = 1}, fresh, {}, first, false));
+  EXPECT_EQ(room_for(room, fresh(), {}, first, Room::too_little), Room::enough)
+      << "nobody makes room";
+  EXPECT_EQ(room_for(room, fresh(), {}, later, Room::enough), Room::too_little)
+      << "with the first run";
+  room.used = 1;
+  EXPECT_EQ(room_for(room, fresh(), {}, first, Room::enough), Room::too_little)
+      << "it would stand still with most of it";
+  EXPECT_EQ(room_for({.limit = 81, .used = 1}, fresh(), {}, first, Room::enough), Room::enough);
   room.expected = 40;
-  EXPECT_FALSE(has_room(room, fresh, {}, first, false)) << "the task itself does not fit";
-  EXPECT_TRUE(has_room(room, fresh, {}, *graph.find(assemble(0)), false));
+  EXPECT_EQ(room_for(room, fresh(), {}, first, Room::enough), Room::too_little)
+      << "nor does the task";
+  EXPECT_EQ(room_for(room, fresh(), {}, *graph.find(assemble(0)), Room::enough), Room::enough);
+}
 
-  const JobInStore begun{graph, book, sizes, baton::Run(1)};
-  const std::vector others{begun};
-  room = {.limit = 159, .is_idle = false};
-  EXPECT_FALSE(has_room(room, fresh, others, first, false)) << "the other has begun a run";
-  room.limit = 160;
-  EXPECT_TRUE(has_room(room, fresh, others, first, false));
+TEST_F(StoreRoomTest, AJobIsBegunBesideOthersWhenAllCanEnd) {
+  const std::vector others{begun()};
+  // The states of both, a run, and an eighth.
+  StoreRoom room{.limit = 181, .is_idle = false};
+  EXPECT_EQ(room_for(room, fresh(), others, first, Room::enough), Room::beside);
+  room.limit = 182;
+  EXPECT_EQ(room_for(room, fresh(), others, first, Room::enough), Room::enough);
+  EXPECT_EQ(room_for(room, fresh(), others, first, Room::beside), Room::beside)
+      << "another one waits for that";
+  EXPECT_EQ(room_for(room, begun(), {}, later, Room::beside), Room::enough);
+  room.kept = room.used = 1;
+  EXPECT_EQ(room_for(room, fresh(), others, first, Room::enough), Room::beside)
+      << "of jobs that have ended";
+  JobInStore paused = begun();
+  paused.may_go_on = false;
+  room = {.limit = 120, .is_idle = false};
+  EXPECT_EQ(room_for(room, begun(), std::vector{paused}, first, Room::enough), Room::enough)
+      << "it need not end now";
+  EXPECT_EQ(room_for(room, begun(), others, first, Room::enough), Room::too_little);
 }
 
 // A task makes 40 bytes. An eighth of 80 is 10.
-TEST(StoreRoom, ARunThatWasBegunEndsThoughItsTilesAreLarger) {
-  const JobSpec spec = small_job(2, 4, 2);
-  const JobGraph graph(spec);
-  const TaskBook book(graph);
-  BlobSizes sizes(spec);
-  sizes.learn({{BlobKind::film, 0, 0, {}, 10}, {BlobKind::state, 1, 0, {}, 20}});
-  const TaskIndex task = *graph.find(render(0, 0));
-  const JobInStore fresh{graph, book, sizes, baton::Run(0)};
-  const JobInStore begun{graph, book, sizes, baton::Run(1)};
+TEST_F(StoreRoomTest, ARunThatWasBegunEndsThoughItsTilesAreLarger) {
   StoreRoom room{.limit = 80, .used = 10, .is_idle = true};
-  EXPECT_TRUE(has_room(room, begun, {}, task, false));
-  EXPECT_FALSE(has_room(room, fresh, {}, task, false)) << "nothing new is begun so";
+  EXPECT_EQ(room_for(room, begun(), {}, first, Room::enough), Room::enough);
+  EXPECT_EQ(room_for(room, fresh(), {}, first, Room::enough), Room::too_little)
+      << "nothing new is begun so";
   room.is_idle = false;
-  EXPECT_TRUE(has_room(room, begun, {}, task, false));
-  EXPECT_FALSE(has_room(room, begun, std::vector{begun}, task, false)) << "others were begun, too";
+  EXPECT_EQ(room_for(room, begun(), {}, first, Room::enough), Room::enough);
+  EXPECT_EQ(room_for(room, begun(), std::vector{begun()}, first, Room::enough), Room::too_little)
+      << "others were begun, too";
   room = {.limit = 80, .used = 11, .is_idle = true};
-  EXPECT_FALSE(has_room(room, begun, {}, task, false)) << "more than an eighth";
+  EXPECT_EQ(room_for(room, begun(), {}, first, Room::enough), Room::too_little)
+      << "more than an eighth";
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "coordinator/schedule/waits.h"
 #include "tests/unit/schedule/farm.h"
 
 namespace baton {
@@ -182,6 +183,36 @@ TEST(Reasons, WorkersRenderOtherwiseHaveFailedOrAreDraining) {
   EXPECT_THAT(chain[0].workers, ElementsAre("c"));
   EXPECT_EQ(chain[0].count, 1u);
   EXPECT_FALSE(chain[0].text.empty()) << "what it said";
+}
+
+// Each worker is told of for what it did itself.
+TEST(Reasons, WhoDoesNotSeeAJobHasNotFailedIt) {
+  ReasonsFarm farm(small_job(1, 2, 1));
+  farm.step(WorkerJoined{"a", {}});
+  farm.step(WorkerJoined{"b", {}});
+  farm.step(LeaseReturned{"b", farm.ask_one("b").lease, "/shows"});
+  farm.fail(farm.ask_one("a"), /*permanent=*/true);
+  const std::vector<Cause> chain = farm.why_task(render(0, 0));
+  ASSERT_THAT(kinds(chain), ElementsAre(ReasonKind::left_out, ReasonKind::tried));
+  EXPECT_THAT(chain[0].workers, ElementsAre("b"));
+  EXPECT_EQ(chain[0].text, "does not see /shows");
+  EXPECT_THAT(chain[1].workers, ElementsAre("a"));
+  EXPECT_EQ(chain[1].text, "boom");
+}
+
+TEST(Reasons, WhoHasFailedATaskIsNamedBesideWhoMayTryIt) {
+  ReasonsFarm farm(small_job(2, 4, 1));
+  farm.step(WorkerJoined{"a", {}});
+  farm.step(WorkerJoined{"b", {}});
+  const GrantLease failed = farm.ask_one("a");
+  farm.fail(failed);
+  const std::vector<Cause> chain = farm.why_task(failed.lease.task);
+  ASSERT_FALSE(chain.empty());
+  const auto told = std::ranges::find(chain, ReasonKind::left_out, &Cause::kind);
+  ASSERT_NE(told, chain.end());
+  EXPECT_THAT(told->workers, ElementsAre("a"));
+  EXPECT_EQ(told->count, 1u);
+  EXPECT_EQ(told->text, "boom");
 }
 
 TEST(Reasons, FramesFarAheadComeLater) {

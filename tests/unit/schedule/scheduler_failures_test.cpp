@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/limits.h"
-#include "coordinator/schedule/reasons.h"
+#include "coordinator/schedule/waits.h"
 #include "tests/unit/schedule/farm.h"
 
 namespace baton {
@@ -147,6 +147,22 @@ TEST_F(SchedulerTest, AFullDiskIsNobodysFailureHoweverOften) {
   EXPECT_EQ(farm.scheduler.find_job(farm.job)->waits, "");
   farm.work_off("a");
   EXPECT_EQ(farm.status(), JobStatus::done);
+}
+
+TEST_F(SchedulerTest, OneTaskTellsWhetherAFullDiskHasSpaceAgain) {
+  for (const GrantLease& grant : farm.ask("a", 2))
+    farm.step(SpaceLacking{"a", grant.lease, "full"});
+  farm.now += Scheduler::kRest;
+  std::vector<GrantLease> grants = farm.ask("a", 2);
+  ASSERT_THAT(grants, SizeIs(1)) << "the other one waits for what this one finds";
+  const auto more = all_of<GrantLease>(farm.finish(grants[0]));
+  EXPECT_THAT(more, Not(IsEmpty()));
+}
+
+TEST_F(SchedulerTest, WhoPausesAJobIsNoDisk) {
+  farm.step(SpaceLacking{"a", farm.ask_one("a").lease, "full"});
+  farm.step(JobPaused{farm.job});
+  EXPECT_EQ(farm.scheduler.find_job(farm.job)->waits, "");
 }
 
 TEST_F(SchedulerTest, FramesAreWrittenWhileRenderingFindsNoSpace) {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/limits.h"
-#include "coordinator/schedule/reasons.h"
+#include "coordinator/schedule/waits.h"
 #include "tests/unit/schedule/farm.h"
 
 /// Cancelled jobs, blobs that nobody needs, restarts of the coordinator.

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
 #include "common/job/motion.h"
 #include "tests/unit/schedule/chaos_farm.h"
 
@@ -38,12 +36,6 @@ JobSpec changed(JobSpec job, std::uint32_t how) {
   job.state.keep = how % 7 == 0 ? StateKeep::all : StateKeep::last;
   job.leading_runs.clear();
   return job;
-}
-
-/// 1,000, or as the environment says: 20,000 are some ten million events.
-std::uint32_t num_seeds() {
-  const char* const text = std::getenv("BATON_MODEL_SEEDS");
-  return text != nullptr ? static_cast<std::uint32_t>(std::strtoul(text, nullptr, 10)) : 1000;
 }
 
 TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {

@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "coordinator/schedule/reasons.h"
+#include "coordinator/schedule/waits.h"
 #include "tests/unit/schedule/farm.h"
 
 namespace baton {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "coordinator/schedule/reasons.h"
+#include "coordinator/schedule/waits.h"
 #include "tests/unit/schedule/farm.h"
 
 /// What is rendered where the store has a limit. In these tests a film takes 10 bytes, a state 20,
@@ -110,19 +110,26 @@ TEST(StoreLimit, CountsWhatARestartFinds) {
   EXPECT_THAT(tasks_of(farm.ask("a", 4)), ElementsAre(assemble(0), assemble(1)));
 }
 
-// The first job waits for room, for all that anybody can tell: the second one finishes what it has
-// begun, and begins no more.
-TEST(StoreLimit, WhatIsBegunIsFinishedBeforeAnythingElse) {
+// For all that anybody can tell the urgent job does not fit: what is begun is finished first.
+TEST(StoreLimit, AJobIsNotBegunBesideOthersWithWhichItCannotEnd) {
   LimitedFarm farm(1000);
   farm.finish(farm.ask_one("a"));
   const GrantLease last = farm.ask_one("a");
   ASSERT_EQ(last.lease.task, render(0, 1));
   JobSpec spec = small_job(6, 4, 2);
   spec.priority = farm.spec().priority + 1;
-  farm.step(JobAdded{digest_of("urgent"), spec, JobStatus::running, {}, {}});
-  EXPECT_THAT(farm.ask("b", 4), IsEmpty());
+  const Digest urgent = digest_of("urgent");
+  farm.step(JobAdded{urgent, spec, JobStatus::running, {}, {}});
+  EXPECT_THAT(tasks_of(farm.ask("b", 4)), ElementsAre(render(1, 0)));
+  EXPECT_EQ(RoomOfTasks(farm.scheduler, *farm.scheduler.find_job(urgent), Room::enough).most(),
+            Room::beside);
   EXPECT_THAT(tasks_of(all_of<GrantLease>(farm.finish(last))),
-              ElementsAre(render(0, 0), assemble(0), assemble(1)));
+              ElementsAre(assemble(0), assemble(1), render(1, 1)));
+  farm.step(JobCancelled{farm.job});
+  farm.step(JobForgotten{farm.job});
+  const auto begun = farm.ask("a", 1);
+  ASSERT_THAT(begun, SizeIs(1));
+  EXPECT_EQ(begun[0].lease.job, urgent);
 }
 
 // With a second pass a run also needs room for the films that come after it.

@@ -103,25 +103,36 @@ TEST_F(ServiceStoreTest, NothingIsSweptBesideAJobThatCannotBeRead) {
 }
 
 // A blob of the fake worker has 5 bytes: a task makes 15.
-TEST_F(ServiceStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
+struct FullStoreTest : ServiceStoreTest {
+  FullStoreTest() { options.store_limit = 45; }
+
+  /// The first job leaves two tasks' blobs, so the other one has room for one task's.
+  Digest fill(const std::string& endpoint, FakeWorker& worker, const SubmitJob& other) {
+    first = ask<JobAccepted>(endpoint, SubmitJob{document}).version;
+    worker.hello();
+    for (int i = 0; i < 2; ++i) worker.do_one_task();
+    // What it has said is known before others are asked.
+    worker.say(Heartbeat{});
+    worker.expect<Heartbeat>();
+    ask<ShownJob>(endpoint, CancelJob{first.hex()});
+    const Digest second = ask<JobAccepted>(endpoint, other).version;
+    worker.do_one_task();
+    worker.say(LeaseRequest{1});
+    worker.expect<NoWork>();
+    return second;
+  }
+
+  Digest first;
+};
+
+TEST_F(FullStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
   JobSpec other = job;
   other.name = "other";
   other.output.directory = (folder / "other").string();
-  options.store_limit = 45;
   const RunningService service(options);
-  const Digest first = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
-  worker.hello();
-  for (int i = 0; i < 2; ++i) worker.do_one_task();
-  // What it has said is known before others are asked.
-  worker.say(Heartbeat{});
-  worker.expect<Heartbeat>();
-  ask<ShownJob>(service.endpoint(), CancelJob{first.hex()}).detail;
   const Digest second =
-      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(other).value()}).version;
-  worker.do_one_task();
-  worker.say(LeaseRequest{1});
-  worker.expect<NoWork>();
+      fill(service.endpoint(), worker, SubmitJob{make_job_document(other).value()});
   const JobDetail waiting = show(service.endpoint(), second);
   EXPECT_EQ(waiting.summary.status, JobStatus::running);
   EXPECT_TRUE(waiting.lacks_room);
@@ -133,27 +144,14 @@ TEST_F(ServiceStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
 }
 
 // Nobody could ask for it by a name. What the newest version of an ended job left stays.
-TEST_F(ServiceStoreTest, WhatAnEarlierVersionLeftGoesWhereThereIsNoRoom) {
-  options.store_limit = 45;
+TEST_F(FullStoreTest, WhatAnEarlierVersionLeftGoes) {
   const RunningService service(options);
-  const Digest first = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).version;
   FakeWorker worker(service.endpoint(), store(), job);
-  worker.hello();
-  for (int i = 0; i < 2; ++i) worker.do_one_task();
-  worker.say(Heartbeat{});
-  worker.expect<Heartbeat>();
-  ask<ShownJob>(service.endpoint(), CancelJob{first.hex()});
   ++job.seed;
   const Digest second =
-      ask<JobAccepted>(service.endpoint(),
-                       SubmitJob{make_job_document(job).value(), /*restart=*/true})
-          .version;
-  worker.do_one_task();
-  worker.say(LeaseRequest{1});
-  worker.expect<NoWork>();
+      fill(service.endpoint(), worker, SubmitJob{make_job_document(job).value(), /*restart=*/true});
   EXPECT_EQ(worker.expect<LeaseGrant>().lease.job, second);
-  const JobDetail detail = show(service.endpoint(), second);
-  EXPECT_FALSE(detail.lacks_room);
+  EXPECT_FALSE(show(service.endpoint(), second).lacks_room);
 }
 
 }  // namespace
