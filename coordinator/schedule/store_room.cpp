@@ -37,7 +37,7 @@ Run end_in_work(const JobInStore& job) {
 
 /// What a job takes at most.
 struct Claim {
-  std::uint64_t stays = 0;     ///< states and films that are there between its runs
+  std::uint64_t stays = 0;     ///< states and films between its runs
   std::uint64_t run = 0;       ///< beside them, while a run is made
   std::uint64_t replaced = 0;  ///< states that go while a run is made
   std::uint64_t at_end = 0;    ///< what goes when it has ended

@@ -51,7 +51,7 @@ std::uint64_t needed_bytes(const JobInStore& job, TaskIndex task);
 /// Whether a task may be granted; if not, what it waits for, least first.
 enum class Room : std::uint8_t {
   enough,
-  beside,      ///< other jobs must end: it is not begun beside them
+  beside,      ///< other jobs must end before it
   too_little,  ///< other runs must end
 };
 /// task: a ready one. others: the other open jobs. before: what jobs that come before this one wait

@@ -53,6 +53,9 @@ def a_job_from_submission_to_its_end(programs, folder):
         text = farm.baton("job", "list").stdout
         check("0 jobs, 1 workers; --all shows 1 that have ended" in text and job[:6] not in text, text)
         check(job[:6] in farm.baton("job", "list", "--all").stdout, "the job is not listed with --all")
+        for since, is_listed in ("10m", True), ("2200-01-01T00:00:00Z", False):
+            lines = farm.baton("job", "list", "--all", "--since", since).stdout
+            check((job[:6] in lines) == is_listed, f"--since {since} looks at when a job ended: {lines}")
         check_equal(saved_jobs(farm), [], "documents of a job that is done")
 
         # The same job again is no new job.

@@ -56,6 +56,39 @@ class CoatKernels : public OnInstructionSet {};
 INSTANTIATE_TEST_SUITE_P(Sets, CoatKernels, testing::ValuesIn(instruction_sets()),
                          instruction_set_name);
 
+// Copies in another order, of which each comes from a block of its own or from a common one.
+TEST_P(CoatKernels, ACopyOfASiteIsTheSite) {
+  const auto materials = materials_of_pixel();
+  const ShadingPoint point = tilted_point(normalize(Vec3{0.3f, 0.9f, 0.2f}));
+  SiteBlock sites, copies;
+  sites.clear(5);
+  copies.clear(5);
+  for (int s = 0; s < 5; ++s) sites.add(s, point, materials[static_cast<std::size_t>(s)]);
+  for (int s = 0; s < 5; ++s) {
+    SiteBlock alone;
+    alone.clear(1);
+    alone.add(0, point, materials[static_cast<std::size_t>(4 - s)]);
+    if (s < 2)
+      copies.add_copy(s, alone, 0);
+    else
+      copies.add_copy(s, sites, 4 - s);
+  }
+  EXPECT_EQ(copies.num_hits, 5);
+  EXPECT_EQ(copies.num_lobes, sites.num_lobes);
+  EXPECT_FLOAT_EQ(copies.specular_sum, sites.specular_sum);
+  const Columns w(upper_directions(203));
+  for (int s = 0; s < 5; ++s) {
+    const std::vector<std::int32_t> of_copy(w.x.size(), s), of_site(w.x.size(), 4 - s);
+    std::vector<float> r(w.x.size()), g(r), b(r), pdf(r), r2(r), g2(r), b2(r), pdf2(r);
+    kernels::evaluate_bsdf(copies, of_copy, w.x, w.y, w.z, r, g, b, pdf);
+    kernels::evaluate_bsdf(sites, of_site, w.x, w.y, w.z, r2, g2, b2, pdf2);
+    EXPECT_EQ(r, r2) << s;
+    EXPECT_EQ(g, g2) << s;
+    EXPECT_EQ(b, b2) << s;
+    EXPECT_EQ(pdf, pdf2) << s;
+  }
+}
+
 TEST_P(CoatKernels, MixedSitesAsTheScalarCode) {
   const auto materials = materials_of_pixel();
   const Columns w(upper_directions(4003));
