@@ -121,7 +121,7 @@ Status expect_within(const FileDescriptor& folder, const Roots& roots) {
     if (!error && !none && lies_in(found, allowed)) return {};
   }
   return Error{ErrorKind::bad_input,
-               fmt::format("{}: lies outside what this farm allows (--root)", found.string())};
+               fmt::format("{}: lies outside what --root allows", found.string())};
 }
 
 /// A new file beside `path` under a name that nobody can foresee, so that no link can lie in wait

@@ -165,7 +165,10 @@ Result<ServerAccess> server_access(const std::string& key_file, bool insecure,
                      "; these keys keep other users of this machine out: --key gives keys of "
                      "another folder, --insecure goes without"};
   }
-  for (auto& [key, speaker] : own->known) speaker = {};
+  // The one that `baton` and workers find by themselves is nobody's name.
+  for (auto& [key, speaker] : own->known) {
+    if (speaker.role == Role::admin) speaker = {};
+  }
   access.key = std::move(*own);
   return access;
 }

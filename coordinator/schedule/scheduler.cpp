@@ -57,6 +57,14 @@ TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t
   return place_of(job.spec, job.tasks.graph().timeline(), task, attempt);
 }
 
+std::string task_text(const Scheduler::Job& job, const TaskKey& task) {
+  std::string text = place_text(place_of(job, task));
+  if (job.spec.quality.sweeps == 1 || task.kind != TaskKind::render) return text;
+  const Timeline& timeline = job.tasks.graph().timeline();
+  const Sweep sweep = timeline.sweep_of(timeline.steps_of(task.run()).first);
+  return text + fmt::format(", sweep {}", sweep.value() + 1);
+}
+
 // ---- events: jobs -------------------------------------------------------------------------------
 
 void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
@@ -434,8 +442,7 @@ void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const st
   for (const TaskIndex hopeless : job.tasks.give_up(task)) revoke_lease(digest, hopeless, actions);
   if (job.tasks.book().counts().failed >= static_cast<std::uint64_t>(job.spec.max_failed_tasks)) {
     end_job(digest, job, JobStatus::failed,
-            fmt::format("{} failed: {}", place_text(place_of(job, job.tasks.graph().key(task))),
-                        reason),
+            fmt::format("{} failed: {}", task_text(job, job.tasks.graph().key(task)), reason),
             actions);
   } else {
     end_if_finished(digest, job, actions);

@@ -209,6 +209,8 @@ std::size_t num_ready(const Scheduler& scheduler);
 double longest_task_seconds(const Scheduler& scheduler);
 /// A task of a job as people see it.
 TaskPlace place_of(const Scheduler::Job& job, const TaskKey& task, std::uint32_t attempt = 0);
+/// place_text of it, with its sweep where the job has several.
+std::string task_text(const Scheduler::Job& job, const TaskKey& task);
 /// What decides the bytes of the job's tasks: the renderer of what is done or, where nothing is, of
 /// what is being done; empty: anybody may begin.
 std::string renderer_of(const Digest& digest, const Scheduler::Job& job, const LeaseBook& leases);

@@ -189,7 +189,7 @@ bool Scheduler::count_loss(const Digest& digest, Job& job, TaskIndex task, Actio
   const std::int32_t losses = job.tasks.attempts().add_loss(task);
   if (losses < limits::kMaxTaskLosses || job.status != JobStatus::running) return true;
   job.waits = fmt::format("somebody to look at {}: its workers or results were lost {} times",
-                          place_text(place_of(job, job.tasks.graph().key(task))), losses);
+                          task_text(job, job.tasks.graph().key(task)), losses);
   pause_job(digest, job, job.waits, actions);
   return false;
 }
@@ -294,7 +294,7 @@ bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<Bl
   const std::string& maker = job.tasks.made().maker(*job.tasks.graph().find(event.lease.task));
   actions.push_back(ReportConflict{event.lease, event.worker, maker, *e, *r});
   if (job.status != JobStatus::running) return false;
-  const std::string place = place_text(place_of(job, event.lease.task));
+  const std::string place = task_text(job, event.lease.task);
   job.waits =
       maker == job.tasks.made().stranger()
           ? fmt::format(

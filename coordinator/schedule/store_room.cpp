@@ -35,6 +35,15 @@ Run end_in_work(const JobInStore& job) {
   return std::min(job.begun_runs, job.book.first_open_run() + kRunsInWork);
 }
 
+/// What a render task of a run adds: in later sweeps its films take the place of those before.
+std::uint64_t added_bytes(const JobInStore& job, Run run) {
+  const Timeline& timeline = job.graph.timeline();
+  const StepSpan steps = timeline.steps_of(run);
+  const std::uint64_t made = job.sizes.mean(job.graph, render_task(run, 0));
+  if (timeline.sweep_of(steps.first) == Sweep(0)) return made;
+  return made - std::min(made, times(steps.size(), job.sizes.mean_film()));
+}
+
 /// What a job takes at most.
 struct Claim {
   std::uint64_t stays = 0;     ///< states and films between its runs
@@ -50,6 +59,7 @@ Claim claim_of(const JobInStore& job) {
   const std::int64_t tiles = graph.num_tiles();
   const std::int64_t sets = num_state_sets(job.spec);
   const std::uint64_t set = sets > 0 ? times(tiles, job.sizes.mean_state()) : 0;
+  const std::int64_t films_stay = num_films_that_stay(job.spec);
   std::uint64_t films = times(tiles, job.sizes.mean(graph, render)) -
                         times(graph.num_outputs(render, BlobKind::state), set);
   if (graph.has_second_pass()) {
@@ -60,8 +70,9 @@ Claim claim_of(const JobInStore& job) {
   const bool is_shared = shares_history(job.spec);
   const std::uint64_t twice = is_shared ? set : std::min(set, 4 * job.sizes.largest(graph, render));
   const bool has_all = job.book.first_open_run().value() >= sets;
-  return {.stays = times(sets, set) +
-                   times(tiles * num_films_that_stay(job.spec), job.sizes.mean_film()),
+  // So do films that stay: in the first sweep they come to be there, later they are replaced.
+  if (films_stay > 0) films = std::min(films, 4 * job.sizes.largest(graph, render));
+  return {.stays = times(sets, set) + times(tiles * films_stay, job.sizes.mean_film()),
           .run = films + twice,
           .replaced = has_all && !is_shared ? set : 0,
           .at_end = times(sets - 1, set)};
@@ -106,7 +117,7 @@ std::uint64_t unmade_bytes(const JobInStore& job, Run end) {
   const JobGraph& graph = job.graph;
   std::uint64_t bytes = 0;
   for (Run run = job.book.first_open_run(); run < end; ++run)
-    bytes += times(job.book.num_open_renders(run), job.sizes.mean(graph, render_task(run, 0)));
+    bytes += times(job.book.num_open_renders(run), added_bytes(job, run));
   if (!graph.has_second_pass() || end == Run(0)) return bytes;
   const Timeline& timeline = graph.timeline();
   const Step last = timeline.steps_of(end - 1).last;

@@ -67,7 +67,7 @@ std::string waits_for(const Scheduler& scheduler, const Digest& digest, TimePoin
     if (job.tasks.book().status(task) != TaskStatus::ready) continue;
     if (!somebody_may_try(crew, job.tasks.attempts().blame(task)))
       return fmt::format("a worker that can do {}: those that are connected have failed it or rest",
-                         place_text(place_of(job, job.tasks.graph().key(task))));
+                         task_text(job, job.tasks.graph().key(task)));
   }
   return {};
 }

@@ -38,11 +38,11 @@ Conduct conduct_of(const FarmCore& farm) {
 }
 
 /// What a task needs of another one.
-std::string input_text(const TaskPlace& task, const TaskPlace& input) {
+std::string input_text(const Scheduler::Job& job, const TaskKey& task, const TaskKey& input) {
   if (task.kind == TaskKind::assemble) return fmt::format("its tile {}", input.tile);
   if (task.kind == TaskKind::second_pass)
     return fmt::format("the first pass of tile {}", input.tile);
-  return "the state of " + place_text(input);
+  return "the state of " + task_text(job, input);
 }
 
 /// Why a worker is not here.
@@ -298,7 +298,7 @@ Reason Answers::reason_of(const Cause& cause) const {
 std::string Answers::place(const Cause& cause) const {
   if (!cause.job) return "the farm";
   if (!cause.task) return "job " + farm_.history.name_of(*cause.job);
-  return place_text(place_of(*farm_.scheduler.find_job(*cause.job), *cause.task));
+  return task_text(*farm_.scheduler.find_job(*cause.job), *cause.task);
 }
 
 std::string Answers::pause_text(const Digest& version, const std::string& waits) const {
@@ -379,7 +379,8 @@ std::string Answers::store_text(const Cause& cause, const std::string& place) co
                                  place, bytes_text(cause.need_bytes), bytes_text(cause.free_bytes));
   if (cause.ended_bytes > 0)
     text += fmt::format("; jobs that have ended hold {}", bytes_text(cause.ended_bytes));
-  if (holders.empty()) return text;
+  if (holders.empty())
+    return cause.ended_bytes > 0 ? text : text + "; the job itself fills it: raise --store-limit";
   text += "; it also holds what is begun of " + names_text(holders, "job");
   return cause.room == Room::beside ? text + ": both at once could not end" : text;
 }
@@ -391,12 +392,11 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::input:
     case ReasonKind::order: {
       const Scheduler::Job& job = *farm_.scheduler.find_job(*cause.job);
-      const TaskPlace awaited = cause.awaited ? place_of(job, *cause.awaited) : TaskPlace();
+      const TaskKey awaited = cause.awaited.value_or(TaskKey());
       if (cause.kind == ReasonKind::order)
         return fmt::format("{} comes after {}: earlier frames come first", place(cause),
-                           place_text(awaited));
-      return fmt::format("{} waits for {}", place(cause),
-                         input_text(place_of(job, *cause.task), awaited));
+                           task_text(job, awaited));
+      return fmt::format("{} waits for {}", place(cause), input_text(job, *cause.task, awaited));
     }
     case ReasonKind::busy:
       return fmt::format("{} is ready, and {}", place(cause), busy_text(cause));

@@ -208,8 +208,8 @@ Status FarmCore::perform(const RecordFailure& action) {
   const Failure& failure = action.failure;
   const Scheduler::Job* const job = scheduler.find_job(failure.lease.job);
   spdlog::warn("job {}: {}, attempt {} on {} failed: {}", history.name_of(failure.lease.job),
-               job ? place_text(place_of(*job, failure.lease.task)) : "a task",
-               failure.lease.attempt, failure.worker, failure.message);
+               job ? task_text(*job, failure.lease.task) : "a task", failure.lease.attempt,
+               failure.worker, failure.message);
   return journal.record_failure(failure);
 }
 

@@ -54,7 +54,7 @@ std::vector<std::string> describe(const Scheduler::Job& job, const std::vector<F
       lines.push_back(last->message);
       continue;
     }
-    const std::string place = place_text(place_of(job, task));
+    const std::string place = task_text(job, task);
     lines.push_back(fmt::format(
         "{} on {}: {}", count == 1 ? place : fmt::format("{} failures, the last {}", count, place),
         last->worker, last->message));

@@ -221,11 +221,12 @@ ordered_json utc_json(std::int64_t time_ms) {
 }
 
 ordered_json place_json(const TaskPlace& place) {
-  return {{"task", task_name(place.kind)},
-          {"firstFrame", place.first.value()},
-          {"lastFrame", place.last.value()},
-          {"tile", place.tile},
-          {"attempt", place.attempt}};
+  ordered_json row = {{"task", task_name(place.kind)},
+                      {"firstFrame", place.first.value()},
+                      {"lastFrame", place.last.value()}};
+  if (place.kind != TaskKind::assemble) row["tile"] = place.tile;
+  row["attempt"] = place.attempt;
+  return row;
 }
 
 std::vector<std::string> fresh_growth(const ShownJob& job, std::size_t& num_told) {

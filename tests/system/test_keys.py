@@ -241,6 +241,9 @@ def other_users_of_the_machine_have_no_key(programs, folder):
             for words in (["job", "list"], ["farm", "stop", "--yes"], ["job", "submit", path]):
                 check_says(farm.baton(*words, expect=UNAVAILABLE).stderr, "either side may lack a key")
             farm.baton("job", "list", "--key", key)  # who is given the key is let in
+            for role, words in ("viewer", ["farm", "stop", "--yes"]), ("worker", ["job", "submit", path]), ("user", ["farm", "stop", "--yes"]):
+                refused = farm.baton(*words, "--key", key.with_name(f"{role}.key"), expect=USAGE).stderr
+                check_says(refused, role)
         finally:
             os.environ["XDG_STATE_HOME"] = STATE_FOLDER
         farm.wait_for(farm.submit(path))
@@ -310,7 +313,7 @@ def jobs_stay_within_the_roots(programs, folder):
             farm.refused("user", "job", "submit", path, says=says, expect=BAD_INPUT)
             check("refused: job 'system test'" in farm.coordinator.log(), "not logged")
 
-        refused(f"output.directory {outside} lies outside what this farm allows", output={"directory": str(outside)})
+        refused(f"output.directory {outside} lies outside what --root allows", output={"directory": str(outside)})
         refused(f"(which is {elsewhere})", output={"directory": str(shows / "way out")})
         make_job(elsewhere)
         refused(f"file {elsewhere / 'lamp.hdr'} lies outside",

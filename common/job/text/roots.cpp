@@ -60,8 +60,8 @@ Status check_path(const fs::path& path, const char* what, const Roots& roots,
   std::vector<std::string> names;
   for (const fs::path& root : roots) names.push_back(root.string());
   return Error{ErrorKind::bad_input,
-               fmt::format("{} {}{} lies outside what this farm allows (--root): {}", what,
-                           path.string(), leads, fmt::join(names, ", "))};
+               fmt::format("{} {}{} lies outside what --root allows: {}", what, path.string(),
+                           leads, fmt::join(names, ", "))};
 }
 
 }  // namespace

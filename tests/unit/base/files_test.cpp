@@ -102,7 +102,7 @@ TEST_F(FilesTest, NothingIsWrittenOutsideTheRoots) {
     const Status refused = write_file_atomic(file, as_bytes_view("x"), roots);
     ASSERT_FALSE(refused.ok()) << file;
     EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
-    EXPECT_THAT(refused.error().message, HasSubstr("outside what this farm allows"));
+    EXPECT_THAT(refused.error().message, HasSubstr("outside what --root allows"));
     EXPECT_FALSE(publish(file).ok()) << file;
   }
   EXPECT_TRUE(fs::is_empty(outside));

@@ -62,7 +62,7 @@ TEST_F(RootsTest, AJobIsRefusedWithThePathAndWhereItLeads) {
   EXPECT_THAT(far.error().message, HasSubstr("has more than 128 folders"));
   document.job.output.directory = "/etc";
   EXPECT_THAT(check_roots(document, roots).error().message,
-              HasSubstr("output.directory /etc lies outside what this farm allows (--root): "));
+              HasSubstr("output.directory /etc lies outside what --root allows: "));
 }
 
 }  // namespace

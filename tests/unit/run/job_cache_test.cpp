@@ -246,8 +246,7 @@ TEST(JobCache, AJobOutsideTheRootsOfAWorkerIsNotSeenByIt) {
   const Digest digest = parse_job_document(json).value().digest;
   const Result<LoadedJobPtr> job = load_job_document({digest, json}, machine, shelf);
   ASSERT_TRUE(job) << job.error().message;
-  EXPECT_NE((*job)->unseen.find("lies outside what this farm allows (--root): /nonexistent"),
-            std::string::npos)
+  EXPECT_NE((*job)->unseen.find("lies outside what --root allows: /nonexistent"), std::string::npos)
       << (*job)->unseen;
 }
 

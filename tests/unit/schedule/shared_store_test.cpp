@@ -24,7 +24,8 @@ JobSpec any_job(std::mt19937& random) {
   JobSpec spec = small_job(tiles, frames, 1 + roll(4), roll(4) != 0);
   if (roll(4) == 0) spec = moving_job(tiles, frames, 1);
   spec.visibility.correlated = roll(3) == 0;
-  if (!spec.visibility.correlated && roll(4) == 0) spec = with_sweeps(spec, 1 + roll(2));
+  if (!spec.visibility.correlated && roll(4) == 0)
+    spec = with_sweeps(spec, 1 + roll(3), roll(2) == 0);
   spec.state.keep = roll(8) == 0 ? StateKeep::all : StateKeep::last;
   spec.priority = 10 * roll(10);
   return spec;
@@ -42,10 +43,12 @@ std::uint64_t fullest(const JobSpec& spec, bool is_requeued) {
   const std::int64_t frame =
       size_of(BlobKind::film) +
       (spec.visibility.correlated ? size_of(BlobKind::film) + size_of(BlobKind::first_pass) : 0);
-  return static_cast<std::uint64_t>(spec.image.width / 8 *
-                                    (size_of(BlobKind::state) * states +
-                                     size_of(BlobKind::film) * num_films_that_stay(spec) +
-                                     (is_requeued ? 2 : 1) * frame * per_run));
+  // Films that stay are those of runs; a few tasks more make theirs.
+  const std::int64_t tiles = spec.image.width / 8, stay = num_films_that_stay(spec);
+  const std::int64_t runs = (is_requeued ? 2 : 1) * frame * per_run;
+  return static_cast<std::uint64_t>(
+      tiles * (size_of(BlobKind::state) * states + size_of(BlobKind::film) * stay) +
+      (stay > 0 ? std::min<std::int64_t>(4, tiles) : tiles) * runs);
 }
 
 class SharedStore {

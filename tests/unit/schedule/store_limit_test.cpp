@@ -132,6 +132,16 @@ TEST(StoreLimit, AJobIsNotBegunBesideOthersWithWhichItCannotEnd) {
   EXPECT_EQ(begun[0].lease.job, urgent);
 }
 
+// States of two checkpoints take 80 bytes, the films of a sweep 160: those of the next one take
+// their place.
+TEST(StoreLimit, LaterSweepsNeedNoRoomForFilmsThatTheyReplace) {
+  Farm farm(with_sweeps(small_job(2, 8, 2), 3, /*refinable=*/false), 1, 270);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  farm.work_off("a");
+  EXPECT_EQ(farm.status(), JobStatus::done) << waits_for(farm.scheduler, farm.job, farm.now);
+}
+
 // With a second pass a run also needs room for the films that come after it.
 TEST(StoreLimit, LeavesRoomForTheSecondPass) {
   JobSpec spec = small_job(2, 8, 2, false);
