@@ -50,8 +50,8 @@ const std::vector<AovTraits>& table() {
       {"cryptoMaterial",        crypto_channels(kCryptoMaterial),      true,     true,        1},
       {"unshadowed",            rgb("unshadowed"),                     true,     false,       9.3},
       {"blocked",               rgb("blocked"),                        true,     false,       10.7},
-      {"direct",                rgb("direct"),                         true,     false,       10},
-      {"indirect",              rgb("indirect"),                       true,     false,       10},
+      {"direct",                rgb("direct"),                         true,     false,       9.3},
+      {"indirect",              rgb("indirect"),                       true,     false,       9.5},
   };
   // clang-format on
   return kTable;

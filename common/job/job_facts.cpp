@@ -25,6 +25,10 @@ bool draws_twice(const JobSpec& job) {
          !(traits(job.sampling.method).tells_variance && job.light.bounces == 0);
 }
 
+bool hides_indirect(const JobSpec& job) {
+  return job.visibility.correlated && job.light.bounces > 0 && !has_aov(job, Aov::indirect);
+}
+
 bool has_catcher(const JobSpec& job) { return !catcher_key(job).empty(); }
 
 std::string catcher_key(const JobSpec& job) {

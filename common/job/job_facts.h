@@ -21,6 +21,9 @@ bool tells_noise(const JobSpec& job);
 /// Whether each pixel is drawn a second time, which tells its variance (the AOV): of a frame with
 /// one round, by a method that tells none.
 bool draws_twice(const JobSpec& job);
+/// Whether films have a part of the picture that frames have not, channels indirect.*: the second
+/// pass draws only the rest anew.
+bool hides_indirect(const JobSpec& job);
 /// Whether something catches shadows; films then have channels shadow.*.
 bool has_catcher(const JobSpec& job);
 /// The key that says so, the first of them: "scene.objects[2].catcher"; empty: none.

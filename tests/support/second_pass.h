@@ -38,7 +38,7 @@ inline CorrelatedResult render_correlated(const RenderContext& context) {
               return Status();
             }};
     const auto stats = run_tile(context, {tile, {}, {Step(0), last_step}}, {}, sink, {});
-    EXPECT_TRUE(stats.ok());
+    EXPECT_TRUE(stats) << stats.error().message;
     result.stats.merge(*stats);
     samples.push_back(last);
   }
@@ -50,7 +50,7 @@ inline CorrelatedResult render_correlated(const RenderContext& context) {
       near.push_back(samples[static_cast<std::size_t>(t)]);
     const auto second =
         run_second_pass(context, last_step, tile, films[static_cast<std::size_t>(tile)], near);
-    EXPECT_TRUE(second.ok());
+    EXPECT_TRUE(second) << second.error().message;
     result.stats.merge(second->stats);
     const FilmTile& film = second->film;
     if (tile == 0) {
@@ -79,7 +79,7 @@ inline JobSpec correlated_job(Method method = Method::bidirectional) {
 
 inline CorrelatedResult render_correlated(const JobSpec& job) {
   const auto context = load_render_context(job, Digest{1, 2});
-  EXPECT_TRUE(context.ok());
+  EXPECT_TRUE(context) << context.error().message;
   return render_correlated(**context);
 }
 

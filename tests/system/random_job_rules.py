@@ -145,11 +145,6 @@ def no_catchers_with_a_second_pass(job, _rng):
         drop_if_true(catcher, "catcher")
 
 
-def no_second_surface_with_a_second_pass(job, _rng):
-    if is_correlated(job):
-        drop_if_true(job.get("light", {}), "bounces")
-
-
 def what_arrives_is_known(job, _rng):
     sampling = job["sampling"]
     if (sampling["method"] == "restir" and sampling.get("reuseVisibility")) or is_correlated(job):
@@ -176,7 +171,7 @@ def one_kind_of_motion(job, _rng):
 RULES = [at_least_as_many_candidates_as_particles, compensation_is_of_mis, one_target_and_only_of_auto,
          a_second_pass_of_few_methods, one_round_with_a_second_pass_or_auto, adaptive_rounds,
          whole_blocks_share_light, more_sites_in_later_rounds,
-         two_folds_are_of_one_size, no_catchers_with_a_second_pass, no_second_surface_with_a_second_pass, what_arrives_is_known,
+         two_folds_are_of_one_size, no_catchers_with_a_second_pass, what_arrives_is_known,
          shadows_in_alpha_of_what_is_transparent, one_kind_of_motion]
 
 

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <optional>
 
 #include "common/base/cpu_clock.h"
+#include "common/job/aov.h"
 #include "worker/exchange/extra_samples.h"
 #include "worker/exchange/traced_exchange.h"
 #include "worker/sampling/folds.h"
@@ -92,11 +95,19 @@ void sample_more(const SecondPassWork& work, std::span<Rgb> radiance, RenderStat
   stats.seconds_second_rays += sampler.seconds_rays();
 }
 
-/// Puts the pixels of the mask into the film.
+/// The planes of three channels; nullopt where the film has none.
+std::optional<std::array<float*, 3>> planes_of(Aov aov, FilmTile& film) {
+  std::array<float*, 3> planes{};
+  for (std::size_t c = 0; c < planes.size(); ++c) planes[c] = film.find(traits(aov).channels[c]);
+  return planes[0] != nullptr ? std::optional(planes) : std::nullopt;
+}
+
+/// Puts the pixels of the mask into the film. Light between surfaces stays as it is.
 void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, FilmTile& film,
                   RenderStats& stats) {
   const bool show_environment = work.context.job.output.background == Background::environment;
   float* const mask = film.find("mask");
+  const auto indirect = planes_of(Aov::indirect, film), direct = planes_of(Aov::direct, film);
   for (std::int32_t y = work.rect.y0; y < work.rect.y1; ++y) {
     for (std::int32_t x = work.rect.x0; x < work.rect.x1; ++x) {
       if (!work.masks.any.at(x, y)) continue;
@@ -104,9 +115,11 @@ void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, Fil
       const std::int32_t position = work.surfaces.find(work.masks.any.index(x, y));
       Rgb value = radiance[pixel] + work.surfaces.emission(position);
       if (show_environment) value += work.surfaces.background(position, work.light.seen);
-      film.plane(0)[pixel] = value.x;
-      film.plane(1)[pixel] = value.y;
-      film.plane(2)[pixel] = value.z;
+      const std::array<float, 3> colors{value.x, value.y, value.z};
+      for (std::size_t c = 0; c < colors.size(); ++c) {
+        if (direct) (*direct)[c][pixel] = colors[c];
+        film.plane(c)[pixel] = colors[c] + (indirect ? (*indirect)[c][pixel] : 0);
+      }
       if (mask != nullptr) mask[pixel] = 0;
       ++stats.pixels_masked;
     }

@@ -24,11 +24,17 @@ Rgb part_of_picture(Aov aov, const PixelResult& pixel) {
 }  // namespace
 
 FilmWriter::FilmWriter(const PixelRect& rect, const JobSpec& job)
-    : aovs_(job.output.aovs), with_shadow_(has_catcher(job)), with_error_(tells_noise(job)) {
+    : aovs_(job.output.aovs),
+      with_indirect_(hides_indirect(job)),
+      with_shadow_(has_catcher(job)),
+      with_error_(tells_noise(job)) {
   film_.rect = rect;
   film_.channels = {"R", "G", "B", "A"};
   for (const Aov aov : aovs_) {
     for (const std::string& name : traits(aov).channels) film_.channels.push_back(name);
+  }
+  if (with_indirect_) {
+    for (const std::string& name : traits(Aov::indirect).channels) film_.channels.push_back(name);
   }
   if (with_shadow_) {
     for (const char* const name : {"shadow.R", "shadow.G", "shadow.B", kCatcherChannel})
@@ -109,6 +115,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         break;
     }
   }
+  if (with_indirect_) put_vec(pixel.indirect);
   if (with_shadow_) {
     put_vec(pixel.shadow);
     put(pixel.catcher);

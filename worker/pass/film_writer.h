@@ -47,8 +47,9 @@ struct PixelResult {
   float catcher = 0;  ///< share of the sites that see it
 };
 
-/// Pass: writes pixels into the channels of the job: R, G, B, A, the AOVs in their order, shadow.*
-/// and kCatcherChannel where something catches shadows, and where the noise is told kErrorChannel.
+/// Pass: writes pixels into the channels of the job: R, G, B, A, the AOVs in their order, and those
+/// that frames have not: indirect.* (hides_indirect), shadow.* and kCatcherChannel where something
+/// catches shadows, and where the noise is told kErrorChannel.
 class FilmWriter {
  public:
   FilmWriter(const PixelRect& rect, const JobSpec& job);
@@ -59,7 +60,7 @@ class FilmWriter {
  private:
   FilmTile film_;
   std::vector<Aov> aovs_;
-  bool with_shadow_, with_error_;
+  bool with_indirect_, with_shadow_, with_error_;
 };
 
 /// False colour of a pixel's source: green carried, red fresh, yellow restarted, blue refreshed,

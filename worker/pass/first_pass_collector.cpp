@@ -18,10 +18,12 @@ void FirstPassCollector::begin(const SampleState& state) {
   samples_.num_populations = state.num_populations;
   samples_.flags.assign(state.num_pixels(), 0);
   samples_.count.assign(state.num_pixels(), 0);
+  first_.assign(state.num_pixels(), 0);
 }
 
 void FirstPassCollector::add_rays(const SampleState& state, std::size_t pixel,
                                   const FoundRays& found) {
+  first_[pixel] = static_cast<std::uint32_t>(samples_.slot.size());
   const std::size_t first = pixel * static_cast<std::size_t>(state.num_particles);
   for (std::size_t i = 0; i < found.sample.size(); ++i)
     add_ray(state, first + found.sample[i], !found.free(i));
@@ -48,6 +50,15 @@ void FirstPassCollector::add_ray(const SampleState& state, std::size_t particle,
                             planes.weight[particle]);
 }
 
+template <class T>
+void FirstPassCollector::put_in_order(std::vector<T>& column) const {
+  std::vector<T> ordered;
+  ordered.reserve(column.size());
+  for (std::size_t pixel = 0; pixel < first_.size(); ++pixel)
+    std::copy_n(column.begin() + first_[pixel], samples_.count[pixel], std::back_inserter(ordered));
+  column = std::move(ordered);
+}
+
 FirstPassSamples FirstPassCollector::finish(const SampleState& state, Step step) {
   samples_.step = step;
   for (std::size_t pixel = 0; pixel < state.num_pixels(); ++pixel) {
@@ -57,6 +68,10 @@ FirstPassSamples FirstPassCollector::finish(const SampleState& state, Step step)
   const SecondPassForm form = job_.visibility.form;
   if (form == SecondPassForm::published || form == SecondPassForm::published_kept)
     std::ranges::copy(ConstSamplePlanes(state).lns, std::back_inserter(samples_.lns));
+  put_in_order(samples_.slot);
+  put_in_order(samples_.site);
+  put_in_order(samples_.direction);
+  put_in_order(samples_.energy);
   samples_.keep_possible(job_.visibility.dilate);
   return std::exchange(samples_, {});
 }

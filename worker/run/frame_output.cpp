@@ -180,6 +180,9 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
   }
   quality.clamped = job.output.clamp_negative;
   drop_channel(image, kErrorChannel);
+  if (hides_indirect(job)) {
+    for (const std::string& name : traits(Aov::indirect).channels) drop_channel(image, name);
+  }
   if (job.output.shadows == ShadowForm::alpha) {
     put_shadows_in_alpha(image);
     for (const char* const name : kShadowChannels) drop_channel(image, name);

@@ -79,7 +79,8 @@ JobEstimate estimate_job(const JobSpec& job) {
     wide_channels += traits(aov).is_float ? count : 0;
   }
   // Films have S / U and its share, frames the quotient, if it is not in A.
-  e.film_channels = frame_channels + (tells_noise(job) ? 1 : 0) + (has_catcher(job) ? 4 : 0);
+  e.film_channels = frame_channels + (tells_noise(job) ? 1 : 0) + (has_catcher(job) ? 4 : 0) +
+                    (hides_indirect(job) ? 3 : 0);
   if (has_catcher(job) && job.output.shadows == ShadowForm::channels) frame_channels += 3;
   e.film_bytes = pixels * e.film_channels * 4;
   const std::int64_t sample_bytes = job.output.pixel_type == PixelType::half_float ? 2 : 4;

@@ -53,6 +53,7 @@ double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
     if (why_empty(aov, job).empty()) bytes += surface_share * film_bytes(aov, equal_weights);
   }
   if (has_catcher(job)) bytes += 3 * kColorBytes * surface_share;
+  if (hides_indirect(job)) bytes += traits(Aov::indirect).film_bytes * surface_share;
   if (!tells_noise(job)) return bytes;
   const bool of_all = std::int64_t{job.quality.rounds} * job.quality.sweeps > 1;
   return bytes + (of_all ? kColorBytes * surface_share : kErrorBytes);

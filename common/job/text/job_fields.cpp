@@ -278,15 +278,11 @@ void check_max_sites(JobArchive& a, const JobSpec& job) {
 /// Whether light between surfaces can be rendered.
 void check_bounces(JobArchive& a, const JobSpec& job) {
   if (job.light.bounces == 0) return;
-  const auto refuse = [&](const std::string& why) {
-    a.fault("light", "bounces 0, as " + why, std::to_string(job.light.bounces));
-  };
-  if (job.visibility.correlated) {
-    refuse("visibility.correlated is true, which knows direct light alone");
-  } else if (job.image.tile_size % limits::kBounceBlock != 0) {
-    refuse(fmt::format("image.tileSize, {}, is no multiple of {}", job.image.tile_size,
-                       limits::kBounceBlock));
-  }
+  if (job.image.tile_size % limits::kBounceBlock != 0)
+    a.fault("light",
+            fmt::format("bounces 0, as image.tileSize, {}, is no multiple of {}",
+                        job.image.tile_size, limits::kBounceBlock),
+            std::to_string(job.light.bounces));
 }
 
 /// Whether the method says what light would arrive if none were blocked.

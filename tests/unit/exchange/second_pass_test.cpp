@@ -64,6 +64,34 @@ TEST(SecondPass, AllPoliciesAndMethodsRun) {
   }
 }
 
+// What the second pass draws anew is direct light; films have the rest, whether frames show it or
+// not.
+TEST(SecondPass, KeepsLightBetweenSurfaces) {
+  JobSpec job = correlated_job(Method::mis);
+  job.image = {.width = 24, .height = 17, .sites = 4, .tile_size = 4096};
+  job.output.aovs = {Aov::direct, Aov::mask};
+  const test::CorrelatedResult alone = render_correlated(job);
+  EXPECT_GT(alone.stats.pixels_masked, 10u);
+  EXPECT_EQ(alone.film.find("indirect.R"), nullptr);
+  job.light.bounces = 2;
+  const FilmTile lit = render_correlated(job).film;
+  float added = 0;
+  for (const std::string c : {"R", "G", "B"}) {
+    const auto whole = channel(lit, c), indirect = channel(lit, "indirect." + c),
+               direct = channel(lit, "direct." + c), before = channel(alone.film, c),
+               direct_before = channel(alone.film, "direct." + c);
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      ASSERT_EQ(direct_before[i], before[i]) << "of masked pixels, too";
+      ASSERT_NEAR(direct[i], before[i], 1e-5f * std::fabs(before[i])) << i;
+      ASSERT_NEAR(whole[i], direct[i] + indirect[i], 1e-5f * std::fabs(whole[i])) << i;
+      added += indirect[i];
+    }
+  }
+  EXPECT_GT(added, 0);
+  job.image.tile_size = 8;
+  EXPECT_EQ(render_correlated(job).film, lit);
+}
+
 TEST(SecondPass, LeavesFreePixelsAlone) {
   const JobSpec job = correlated_job();
   const test::TileResult first = [&] {

@@ -100,6 +100,21 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
   })) << "the camera stands at (0, 0, 5)";
 }
 
+TEST(FrameOutput, WhatFilmsAloneHaveIsInNoFrame) {
+  JobSpec job = small_job("hidden");
+  job.visibility.correlated = true;
+  job.light.bounces = 1;
+  FilmTile image = blank_image(job.image.rendered(),
+                               {"R", "G", "B", "A", "indirect.R", "indirect.G", "indirect.B"});
+  for (const bool wanted : {false, true}) {
+    if (wanted) job.output.aovs = {Aov::indirect};
+    ASSERT_TRUE(write_frame(job, {3, 4}, FrameIndex(0), image));
+    const auto frame = read_exr(frame_path(job, FrameIndex(0)).string());
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_EQ(frame->find("indirect.G") != nullptr, wanted);
+  }
+}
+
 TEST(FrameOutput, AWrongValueIsFoundInTheFrameThatLooksAtItsBlock) {
   JobSpec job = small_job("verified");
   job.image.height = 40;
