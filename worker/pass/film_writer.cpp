@@ -44,6 +44,22 @@ FilmWriter::FilmWriter(const PixelRect& rect, const JobSpec& job)
   film_.values.resize(film_.channels.size() * film_.num_pixels());
 }
 
+/// What frames have not, or not so.
+void FilmWriter::write_hidden(std::size_t index, std::size_t channel, const PixelResult& pixel) {
+  const auto put = [&](float value) { film_.plane(channel++)[index] = value; };
+  const auto put_color = [&](const Rgb& v) {
+    put(v.x);
+    put(v.y);
+    put(v.z);
+  };
+  if (with_indirect_) put_color(pixel.indirect);
+  if (with_shadow_) {
+    put_color(pixel.shadow);
+    put(pixel.catcher);
+  }
+  if (with_error_) put(pixel.error);
+}
+
 void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
   std::size_t channel = 0;
   const auto put = [&](float value) { film_.plane(channel++)[index] = value; };
@@ -115,12 +131,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         break;
     }
   }
-  if (with_indirect_) put_vec(pixel.indirect);
-  if (with_shadow_) {
-    put_vec(pixel.shadow);
-    put(pixel.catcher);
-  }
-  if (with_error_) put(pixel.error);
+  write_hidden(index, channel, pixel);
 }
 
 }  // namespace baton

@@ -58,6 +58,8 @@ class FilmWriter {
   const FilmTile& film() const { return film_; }
 
  private:
+  void write_hidden(std::size_t index, std::size_t channel, const PixelResult& pixel);
+
   FilmTile film_;
   std::vector<Aov> aovs_;
   bool with_indirect_, with_shadow_, with_error_;

@@ -118,7 +118,6 @@ struct FullStoreTest : ServiceStoreTest {
     const Digest second = ask<JobAccepted>(endpoint, other).version;
     worker.do_one_task();
     worker.say(LeaseRequest{1});
-    worker.expect<NoWork>();
     return second;
   }
 
@@ -133,6 +132,7 @@ TEST_F(FullStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
   FakeWorker worker(service.endpoint(), store(), job);
   const Digest second =
       fill(service.endpoint(), worker, SubmitJob{make_job_document(other).value()});
+  worker.expect<NoWork>();
   const JobDetail waiting = show(service.endpoint(), second);
   EXPECT_EQ(waiting.summary.status, JobStatus::running);
   EXPECT_TRUE(waiting.lacks_room);
@@ -143,7 +143,8 @@ TEST_F(FullStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
   EXPECT_FALSE(show(service.endpoint(), second).lacks_room);
 }
 
-// Nobody could ask for it by a name. What the newest version of an ended job left stays.
+// Nobody could ask for it by a name, so it goes before the worker is told that there is no work, or
+// soon after. What the newest version of an ended job left stays.
 TEST_F(FullStoreTest, WhatAnEarlierVersionLeftGoes) {
   const RunningService service(options);
   FakeWorker worker(service.endpoint(), store(), job);
