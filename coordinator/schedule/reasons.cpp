@@ -362,7 +362,13 @@ void Reasons::explain_free(const Digest& digest, const Scheduler::Job& job, Task
   } else {
     explain_room(digest, job, task, waiting, cause);
   }
+  const std::vector<Digest> holders = cause.jobs;
   chain.push_back(std::move(cause));
+  // One that a person holds back holds its room, too.
+  for (const Digest& holder : holders) {
+    if (scheduler_.find_job(holder)->status == JobStatus::paused)
+      return chain.push_back(*end_of(holder, *scheduler_.find_job(holder)));
+  }
 }
 
 /// Why the store has no room for the task. waiting: a job that comes first and waits for room.

@@ -78,26 +78,27 @@ Claim claim_of(const JobInStore& job) {
           .at_end = times(sets - 1, set)};
 }
 
-/// Whether all jobs that were begun, and this one, can end one after the other [Dijkstra 1965, the
-/// banker's algorithm], a run being what is lent. Those that could not even alone are not waited
-/// for.
+/// Whether a job may be begun beside others: whether all that were begun, and this one, can end one
+/// after the other [Dijkstra 1965, the banker's algorithm], a run being what is lent. Those that
+/// could not even alone are not waited for; paused ones are to end, too.
 bool can_all_end(const StoreRoom& room, const JobInStore& job, std::span<const JobInStore> others) {
+  const std::uint64_t held = room.used - std::min(room.used, room.kept);
   std::vector<Claim> claims{claim_of(job)};
-  if (claims[0].whole() > room.limit) return false;
   std::uint64_t taken = room.kept + claims[0].stays;
   for (const JobInStore& other : others) {
     if (other.begun_runs == Run(0)) continue;
     const Claim claim = claim_of(other);
     if (claim.whole() > room.limit) {
-      taken += std::min(claim.stays, room.used - std::min(room.used, room.kept));
+      taken += std::min(claim.stays, held);
       continue;
     }
     taken += claim.stays;
     claims.push_back(claim);
   }
+  if (claims.size() == 1) return true;  // it is as if it were alone
   // What is not made may turn out larger.
   const std::uint64_t budget = room.limit - room.limit / kSlackShare;
-  if (taken > budget) return false;
+  if (claims[0].whole() > room.limit || taken > budget) return false;
   std::uint64_t free = budget - taken;
   std::ranges::sort(claims, {}, &Claim::run);
   for (const Claim& claim : claims) {
@@ -105,10 +106,6 @@ bool can_all_end(const StoreRoom& room, const JobInStore& job, std::span<const J
     free += claim.at_end;
   }
   return true;
-}
-
-bool any_begun(std::span<const JobInStore> jobs) {
-  return std::ranges::any_of(jobs, [](const JobInStore& job) { return job.begun_runs > Run(0); });
 }
 
 }  // namespace
@@ -142,7 +139,7 @@ Room room_for(const StoreRoom& room, const JobInStore& job, std::span<const JobI
   if (room.limit == 0 || key.kind == TaskKind::assemble) return Room::enough;
   const auto enough_if = [](bool is_enough) { return is_enough ? Room::enough : Room::too_little; };
   const bool is_new = job.begun_runs == Run(0);
-  if (is_new && any_begun(others) && !can_all_end(room, job, others)) return Room::beside;
+  if (is_new && !can_all_end(room, job, others)) return Room::beside;
   // Where sizes are estimated and nobody works, one task tells more.
   if (room.is_idle && !job.sizes.are_known(job.graph, key))
     return enough_if(room.used < room.limit);

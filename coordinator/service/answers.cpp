@@ -375,14 +375,27 @@ std::string Answers::store_text(const Cause& cause, const std::string& place) co
   if (cause.room == Room::enough)
     return fmt::format("room in the store is left for {}, which comes before {}",
                        names_text(holders, "job"), place);
+  const std::uint64_t limit = farm_.scheduler.room().limit;
+  if (cause.need_bytes > limit)
+    return fmt::format(
+        "the store, of {}, is too small for all tiles of {}, which need {}: raise "
+        "--store-limit",
+        bytes_text(limit), place, bytes_text(cause.need_bytes));
+  if (cause.room == Room::beside)
+    return fmt::format(
+        "{} waits for the end of {}: a store of {} could not end both{}", place,
+        names_text(holders, "job"), bytes_text(limit),
+        cause.ended_bytes > 0
+            ? fmt::format(", as jobs that have ended hold {} of it", bytes_text(cause.ended_bytes))
+            : "");
   std::string text = fmt::format("the store has no room for all tiles of {}: they need {}, free {}",
                                  place, bytes_text(cause.need_bytes), bytes_text(cause.free_bytes));
   if (cause.ended_bytes > 0)
     text += fmt::format("; jobs that have ended hold {}", bytes_text(cause.ended_bytes));
   if (holders.empty())
-    return cause.ended_bytes > 0 ? text : text + "; the job itself fills it: raise --store-limit";
-  text += "; it also holds what is begun of " + names_text(holders, "job");
-  return cause.room == Room::beside ? text + ": both at once could not end" : text;
+    return cause.ended_bytes > 0 ? text
+                                 : text + "; the job itself holds the rest: raise --store-limit";
+  return text + "; it also holds what is begun of " + names_text(holders, "job");
 }
 
 std::string Answers::text_of(const Cause& cause) const {

@@ -62,7 +62,8 @@ std::string History::name_of(const Digest& version) const {
 
 Status History::tell(FarmEvent event) {
   event.time_ms = now_ms();
-  event.actor = actor_;
+  // Whom the scheduler gives a task to is nobody's doing.
+  if (event.kind != FarmEventKind::task_granted) event.actor = actor_;
   event.reason.resize(std::min<std::size_t>(event.reason.size(), limits::kMaxTextLength));
   past_.add(event);
   return journal_.record_event(event);

@@ -123,12 +123,19 @@ TEST_F(StoreRoomTest, AJobIsBegunBesideOthersWhenAllCanEnd) {
   room.kept = room.used = 1;
   EXPECT_EQ(room_for(room, fresh(), others, first, Room::enough), Room::beside)
       << "of jobs that have ended";
+  // The other one alone needs 120.
+  room = {.limit = 119, .used = 0, .is_idle = true};
+  EXPECT_EQ(room_for(room, fresh(), others, first, Room::enough), Room::too_little)
+      << "for its run, not for its end, which never comes";
   JobInStore paused = begun();
   paused.may_go_on = false;
   room = {.limit = 120, .is_idle = false};
   EXPECT_EQ(room_for(room, begun(), std::vector{paused}, first, Room::enough), Room::enough)
       << "it need not end now";
   EXPECT_EQ(room_for(room, begun(), others, first, Room::enough), Room::too_little);
+  room = {.limit = 181, .is_idle = true};
+  EXPECT_EQ(room_for(room, fresh(), std::vector{paused}, first, Room::enough), Room::beside)
+      << "it is to end, too";
 }
 
 // A task makes 40 bytes. An eighth of 80 is 10.

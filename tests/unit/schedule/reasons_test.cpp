@@ -215,6 +215,22 @@ TEST(Reasons, WhoHasFailedATaskIsNamedBesideWhoMayTryIt) {
   EXPECT_EQ(told->text, "boom");
 }
 
+// A film takes 10 bytes and a state 20; of the other job only the estimate is known.
+TEST(Reasons, APausedJobThatHoldsRoomIsTheLastCause) {
+  ReasonsFarm farm(small_job(2, 4, 2), 1000);
+  farm.step(WorkerJoined{"a", {}});
+  farm.finish(farm.ask_one("a"));
+  farm.step(JobPaused{farm.job});
+  const Digest other = digest_of("other");
+  farm.step(JobAdded{other, small_job(6, 4, 2), JobStatus::running, {}, {}});
+  farm.step(WorkRequested{"a", 1});
+  const std::vector<Cause> chain = Reasons(farm.scheduler, farm.now).of_job(other);
+  ASSERT_THAT(kinds(chain), ElementsAre(ReasonKind::input, ReasonKind::store, ReasonKind::paused));
+  EXPECT_EQ(chain[1].room, Room::beside);
+  EXPECT_THAT(chain[1].jobs, ElementsAre(farm.job));
+  EXPECT_EQ(chain[2].job, farm.job);
+}
+
 TEST(Reasons, FramesFarAheadComeLater) {
   JobSpec spec = small_job(1, 4000, 1, /*carry=*/false);
   spec.image = {.width = 4096, .height = 4096, .sites = 1, .tile_size = 4096};

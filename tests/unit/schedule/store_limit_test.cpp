@@ -142,6 +142,27 @@ TEST(StoreLimit, LaterSweepsNeedNoRoomForFilmsThatTheyReplace) {
   EXPECT_EQ(farm.status(), JobStatus::done) << waits_for(farm.scheduler, farm.job, farm.now);
 }
 
+// After its first frames it holds 40 bytes and needs 80 for the next ones.
+TEST(StoreLimit, AJobThatCannotEndDoesNotKeepOthers) {
+  LimitedFarm farm(100);
+  for (int i = 0; i < 2; ++i) farm.finish(farm.ask_one("a"));
+  farm.work_off("a");
+  EXPECT_EQ(farm.scheduler.store_bytes(), 40u);
+  EXPECT_TRUE(lacks_room(farm.scheduler, farm.job));
+  const JobSpec small = small_job(1, 2, 2, /*carry=*/false);
+  const Digest other = digest_of("other");
+  std::vector<GrantLease> grants =
+      all_of<GrantLease>(farm.step(JobAdded{other, small, JobStatus::running, {}, {}}));
+  for (std::size_t i = 0; i < grants.size(); ++i) {
+    const LeaseId lease = grants[i].lease;
+    EXPECT_EQ(lease.job, other);
+    for (GrantLease& more : all_of<GrantLease>(
+             farm.step(TaskCompleted{"a", lease, {outputs_of(small, other, lease.task)}})))
+      grants.push_back(std::move(more));
+  }
+  EXPECT_EQ(farm.scheduler.find_job(other)->status, JobStatus::done);
+}
+
 // With a second pass a run also needs room for the films that come after it.
 TEST(StoreLimit, LeavesRoomForTheSecondPass) {
   JobSpec spec = small_job(2, 8, 2, false);
