@@ -47,10 +47,10 @@ TEST(JobReport, FailuresOfOneCauseAreOneLine) {
 }
 
 // Runs 0 and 1 are the first sweep, 2 and 3 the second.
-TEST(JobReport, ATaskOfALaterSweepStandsAtTheSameFrames) {
+TEST(JobReport, ATaskOfALaterSweepSaysWhichOne) {
   const JobSpec job = with_sweeps(small_job(2, 4, 2), 3);
-  EXPECT_EQ(report_of(job, render(3, 0)), "frames 3-4, tile 0 on w: boom");
-  EXPECT_EQ(report_of(job, render(4, 0)), "frames 1-2, tile 0 on w: boom");
+  EXPECT_EQ(report_of(job, render(3, 0)), "frames 3-4, tile 0, sweep 2 on w: boom");
+  EXPECT_EQ(report_of(job, render(4, 0)), "frames 1-2, tile 0, sweep 3 on w: boom");
 }
 
 }  // namespace
