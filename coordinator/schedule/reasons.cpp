@@ -366,8 +366,11 @@ void Reasons::explain_free(const Digest& digest, const Scheduler::Job& job, Task
   chain.push_back(std::move(cause));
   // One that a person holds back holds its room, too.
   for (const Digest& holder : holders) {
-    if (scheduler_.find_job(holder)->status == JobStatus::paused)
-      return chain.push_back(*end_of(holder, *scheduler_.find_job(holder)));
+    const Scheduler::Job& other = *scheduler_.find_job(holder);
+    if (other.status != JobStatus::paused) continue;
+    chain.push_back(*end_of(holder, other));
+    chain.back().jobs = {holder};
+    return;
   }
 }
 

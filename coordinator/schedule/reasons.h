@@ -27,7 +27,8 @@ struct Cause {
   /// Of links that are left out; of tried: failures of the task.
   std::size_t count = 0;
   /// Of busy: whose tasks the workers have, each once. Of no_job: those that are paused. Of store:
-  /// others that were begun; where there is room, the one that comes first.
+  /// others that were begun; where there is room, the one that comes first. Of paused: another than
+  /// the one that waits.
   std::vector<Digest> jobs = {};
   std::uint64_t need_bytes = 0, free_bytes = 0, ended_bytes = 0;
   Room room = Room::enough;

@@ -375,16 +375,17 @@ std::string Answers::store_text(const Cause& cause, const std::string& place) co
   if (cause.room == Room::enough)
     return fmt::format("room in the store is left for {}, which comes before {}",
                        names_text(holders, "job"), place);
-  const std::uint64_t limit = farm_.scheduler.room().limit;
-  if (cause.need_bytes > limit)
+  // While something is in work, runs end and make room.
+  const StoreRoom room = farm_.scheduler.room();
+  if (room.is_idle && cause.need_bytes > room.limit)
     return fmt::format(
         "the store, of {}, is too small for all tiles of {}, which need {}: raise "
         "--store-limit",
-        bytes_text(limit), place, bytes_text(cause.need_bytes));
+        bytes_text(room.limit), place, bytes_text(cause.need_bytes));
   if (cause.room == Room::beside)
     return fmt::format(
         "{} waits for the end of {}: a store of {} could not end both{}", place,
-        names_text(holders, "job"), bytes_text(limit),
+        names_text(holders, "job"), bytes_text(room.limit),
         cause.ended_bytes > 0
             ? fmt::format(", as jobs that have ended hold {} of it", bytes_text(cause.ended_bytes))
             : "");
@@ -393,8 +394,9 @@ std::string Answers::store_text(const Cause& cause, const std::string& place) co
   if (cause.ended_bytes > 0)
     text += fmt::format("; jobs that have ended hold {}", bytes_text(cause.ended_bytes));
   if (holders.empty())
-    return cause.ended_bytes > 0 ? text
-                                 : text + "; the job itself holds the rest: raise --store-limit";
+    return room.is_idle && cause.ended_bytes == 0
+               ? text + "; the job itself holds the rest: raise --store-limit"
+               : text;
   return text + "; it also holds what is begun of " + names_text(holders, "job");
 }
 
@@ -436,7 +438,8 @@ std::string Answers::text_of(const Cause& cause) const {
     case ReasonKind::disk:
       return "it waits for " + (cause.text.empty() ? std::string("a disk") : cause.text);
     case ReasonKind::paused:
-      return (cause.text.empty() ? "paused " : "paused: ") + pause_text(*cause.job, cause.text);
+      return (cause.jobs.empty() ? "" : place(cause) + " is ") +
+             (cause.text.empty() ? "paused " : "paused: ") + pause_text(*cause.job, cause.text);
     case ReasonKind::ended:
       return fmt::format("{} is {}", cause.task ? place(cause) : "the job", cause.text);
     case ReasonKind::draining:

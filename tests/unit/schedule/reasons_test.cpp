@@ -229,6 +229,7 @@ TEST(Reasons, APausedJobThatHoldsRoomIsTheLastCause) {
   EXPECT_EQ(chain[1].room, Room::beside);
   EXPECT_THAT(chain[1].jobs, ElementsAre(farm.job));
   EXPECT_EQ(chain[2].job, farm.job);
+  EXPECT_THAT(chain[2].jobs, ElementsAre(farm.job)) << "which is not the one that waits";
 }
 
 TEST(Reasons, FramesFarAheadComeLater) {
