@@ -363,7 +363,7 @@ struct PictureSource {
   std::string store_directory = {};
   std::int32_t num_tiles = 0;
   std::vector<BlobRef> films = {};  ///< of the tiles that are finished
-  /// What the picture lacks beside others: ", sweep 1 of 3", ", without its plate".
+  /// What the picture is not: ", sweep 1 of 3", ", without its plate", ", as it was before ...".
   std::string note = {};
 };
 struct Refused {

@@ -330,8 +330,8 @@ struct ReportConflict {
   std::string worker, maker;  ///< who reports, and who did first
   BlobRef expected, reported;
 };
-/// Nobody needs these blobs now; a later step may need one again, so ask is_referenced() before
-/// removing.
+/// Nobody needs these blobs now; a later step may need one again, so ask is_referenced() and
+/// is_made_again() before removing.
 struct RemoveBlobs {
   std::vector<Digest> blobs;
 };

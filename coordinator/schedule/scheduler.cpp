@@ -39,6 +39,16 @@ const Scheduler::Job* Scheduler::find_job(const Digest& job) const {
   return found == jobs_.end() ? nullptr : &found->second;
 }
 
+bool Scheduler::is_made_again(const Digest& blob) const {
+  return std::ranges::any_of(leases_.all(), [&](const auto& lease) {
+    const auto& [job, task] = lease.first;
+    const Job* const known = find_job(job);
+    if (known == nullptr) return false;
+    const std::vector<BlobRef>& former = known->tasks.made().former_outputs(task);
+    return std::ranges::find(former, blob, &BlobRef::digest) != former.end();
+  });
+}
+
 std::vector<Digest> Scheduler::jobs() const {
   std::map<std::uint64_t, Digest> by_sequence;
   for (const auto& [digest, job] : jobs_) by_sequence[job.sequence] = digest;

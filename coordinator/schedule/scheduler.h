@@ -122,6 +122,8 @@ class Scheduler {
   /// Who is connected and has which lease.
   const LeaseBook& leases() const { return leases_; }
   bool is_referenced(const Digest& blob) const { return blobs_.contains(blob); }
+  /// Whether a task in work made this blob before: it may be put again at any moment.
+  bool is_made_again(const Digest& blob) const;
 
  private:
   /// A task that a worker holds.

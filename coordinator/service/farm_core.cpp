@@ -28,6 +28,23 @@ constexpr int kMaxFailuresShown = 100;
 /// Of what a refusal says; names in it may be of any length.
 constexpr std::size_t kMaxRefusalBytes = 64u << 10;
 
+/// Frames of a job that were to be made once more, and whose files are those from before, as far as
+/// can be told without reading them.
+std::set<FrameIndex> former_frames(const Scheduler::Job* job, const FileTable& files) {
+  std::set<FrameIndex> frames;
+  for (TaskIndex task = 0; job != nullptr && task < job->tasks.graph().num_frames(); ++task) {
+    const std::vector<BlobRef>& former = job->tasks.made().former_outputs(task);
+    if (former.empty() || job->tasks.book().status(task) == TaskStatus::done) continue;
+    const FrameIndex frame(task);
+    const fs::path path = frame_path(job->spec, frame);
+    const FileState state = files.judge(path, former.front()).state;
+    const auto stamp = stamp_of(path);
+    const bool has_size = stamp && *stamp && (*stamp)->size_bytes == former.front().size_bytes;
+    if (state == FileState::right || (state == FileState::unknown && has_size)) frames.insert(frame);
+  }
+  return frames;
+}
+
 }  // namespace
 
 FarmCore::FarmCore(const ServiceOptions& with, Router messages, Journal records, BlobStore blobs,
@@ -56,7 +73,7 @@ Status FarmCore::let_out() {
   }
   return garbage.remove_some(store, [this](const Digest& blob) -> Result<bool> {
     BATON_ASSIGN(const bool is_kept, journal.is_kept(blob));
-    return is_kept || scheduler.is_referenced(blob);
+    return is_kept || scheduler.is_referenced(blob) || scheduler.is_made_again(blob);
   });
 }
 
@@ -164,12 +181,13 @@ Result<bool> FarmCore::ended_by_frames(const Digest& job, const std::string& rea
   return true;
 }
 
-Status FarmCore::archive_ended() {
-  for (const Digest& job : std::exchange(ended_, {})) BATON_TRY(archive_job(job));
+Status FarmCore::archive_ended(const FileTable& files) {
+  for (const Digest& job : std::exchange(ended_, {}))
+    BATON_TRY(archive_job(job, former_frames(scheduler.find_job(job), files)));
   return {};
 }
 
-Status FarmCore::archive_job(const Digest& digest) {
+Status FarmCore::archive_job(const Digest& digest, const std::set<FrameIndex>& stand) {
   const Scheduler::Job* const job = scheduler.find_job(digest);
   if (job == nullptr || is_open(job->status)) return {};
   superseded_keep_ = true;
@@ -187,7 +205,15 @@ Status FarmCore::archive_job(const Digest& digest) {
         kept.push_back(blob);
     }
   }
-  BATON_ASSIGN(const JobDetail detail, living_detail(digest));
+  BATON_ASSIGN(JobDetail detail, living_detail(digest));
+  for (const FrameIndex frame : stand) {
+    const TaskIndex task = *job->tasks.graph().find(assemble_task(frame));
+    BATON_TRY(journal.record_completion(
+        digest, {assemble_task(frame), {.outputs = job->tasks.made().former_outputs(task)}}));
+  }
+  if (!stand.empty()) detail.frames_done = finished_frames(*job, stand);
+  detail.summary.frames_done += static_cast<std::uint32_t>(stand.size());
+  detail.summary.tasks_done += stand.size();
   BATON_TRY(journal.archive_job(digest, to_bytes(detail.summary), to_bytes(detail), kept));
   lost_before.erase(digest);
   notes.erase(digest);

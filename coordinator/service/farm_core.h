@@ -15,6 +15,7 @@
 #include "coordinator/journal/journal.h"
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/service/file_reader.h"
+#include "coordinator/service/file_table.h"
 #include "coordinator/service/folder_record.h"
 #include "coordinator/service/garbage.h"
 #include "coordinator/service/history.h"
@@ -120,11 +121,13 @@ class FarmCore {
 
   /// The job has ended: it leaves the memory at the end of the turn.
   void note_ended(const Digest& job) { ended_.push_back(job); }
-  /// Jobs that have ended leave the memory.
-  Status archive_ended();
+  /// Jobs that have ended leave the memory. files: of frames that were to be made once more, and
+  /// were not, those that stand as before are the job's.
+  Status archive_ended(const FileTable& files);
   /// A job that has ended leaves the memory; what people may ask of it, and its blobs that a later
   /// job may go on from, stand in the archive. One that is there, or runs again, stays as it is.
-  Status archive_job(const Digest& job);
+  /// stand: frames that count as done, as before they were to be made once more.
+  Status archive_job(const Digest& job, const std::set<FrameIndex>& stand = {});
   /// Tells the scheduler what ended jobs leave in the store. Where an open job has no room, what
   /// earlier versions of jobs left goes before: nobody can ask for it by name.
   Status count_kept();

@@ -17,16 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The frames that are finished. Assemble tasks come first, by frame.
-std::vector<FrameNumber> finished_frames(const Scheduler::Job& job) {
-  std::vector<FrameNumber> frames;
-  for (TaskIndex frame = 0; frame < job.tasks.graph().num_frames(); ++frame) {
-    if (job.tasks.book().status(frame) == TaskStatus::done)
-      frames.push_back(job.spec.frames[static_cast<std::size_t>(frame)]);
-  }
-  return frames;
-}
-
 /// A line for each worker and cause, in the order in which each came last. Behind the first line of
 /// a message stands what is to be done of its task alone.
 std::vector<std::string> describe(const Scheduler::Job& job, const std::vector<Failure>& failures) {
@@ -64,6 +54,18 @@ std::vector<std::string> describe(const Scheduler::Job& job, const std::vector<F
 
 }  // namespace
 
+std::vector<FrameNumber> finished_frames(const Scheduler::Job& job,
+                                         const std::set<FrameIndex>& besides) {
+  std::vector<FrameNumber> frames;
+  // Assemble tasks come first, by frame.
+  for (TaskIndex task = 0; task < job.tasks.graph().num_frames(); ++task) {
+    const FrameIndex frame(task);
+    if (job.tasks.book().status(task) == TaskStatus::done || besides.contains(frame))
+      frames.push_back(job.spec.frames[frame.index()]);
+  }
+  return frames;
+}
+
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
   const JobProgress progress = job.tasks.progress();
   JobSummary summary;
@@ -90,7 +92,7 @@ JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
 JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
                        const std::vector<Failure>& failures) {
   const Scheduler::Job& job = *scheduler.find_job(digest);
-  JobDetail detail{summarize(digest, job), finished_frames(job), {}};
+  JobDetail detail{summarize(digest, job), finished_frames(job, {}), {}};
   detail.failures = describe(job, failures);
   for (const auto& [frame, stats] : job.tasks.frames()) {
     const FrameNumber number = job.spec.frames[frame.index()];

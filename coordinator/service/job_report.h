@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,9 @@
 
 namespace baton {
 
+/// The frames that are finished, and others, in the job's order.
+std::vector<FrameNumber> finished_frames(const Scheduler::Job& job,
+                                         const std::set<FrameIndex>& besides);
 /// What people are told of a job.
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job);
 /// Describes a job that the scheduler knows. `failures`: the newest last.

@@ -57,12 +57,26 @@ std::optional<BlobRef> newest_film(const JobSpec& spec, const JobTasks& tasks, F
   return std::nullopt;
 }
 
+/// The last of the first `end` frames that is so; nullopt: none is.
+template <class IsSo>
+std::optional<FrameIndex> last_frame(FrameIndex end, const IsSo& is_so) {
+  for (FrameIndex frame = end; frame > FrameIndex(0);) {
+    frame = frame - 1;
+    if (is_so(frame)) return frame;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 Result<PictureSource> find_picture(const JobSpec& spec, const JobTasks& tasks,
                                    const AskPicture& question) {
   const auto is_written = [&](FrameIndex frame) {
     return tasks.book().status(*tasks.graph().find(assemble_task(frame))) == TaskStatus::done;
+  };
+  // Its file is there until the new one takes its place.
+  const auto was_written = [&](FrameIndex frame) {
+    return !tasks.made().former_outputs(*tasks.graph().find(assemble_task(frame))).empty();
   };
   const FrameIndex end(tasks.graph().num_frames());
   FrameIndex frame{0};
@@ -73,10 +87,14 @@ Result<PictureSource> find_picture(const JobSpec& spec, const JobTasks& tasks,
     while (frame < end && is_written(frame)) ++frame;
     if (frame == end) frame = end - 1;
   } else {
-    frame = end - 1;
-    while (frame > FrameIndex(0) && !is_written(frame)) frame = frame - 1;
+    frame = last_frame(end, is_written).value_or(last_frame(end, was_written).value_or(frame));
   }
   if (is_written(frame)) return written_frame(spec, frame);
+  if (!question.partial && was_written(frame)) {
+    PictureSource before = written_frame(spec, frame);
+    before.note = ", as it was before it is rendered again";
+    return before;
+  }
   if (!question.partial) return nothing_written(spec, question);
 
   PictureSource source{.frame = spec.frames[frame.index()],

@@ -155,7 +155,7 @@ Status Service::end_turn() {
   }
 
   // First durable, then known to others.
-  BATON_TRY(farm_.archive_ended());
+  BATON_TRY(farm_.archive_ended(files_));
   BATON_TRY(farm_.count_kept());
   BATON_TRY(farm_.journal.commit());
   return farm_.let_out();

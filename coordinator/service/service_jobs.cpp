@@ -54,7 +54,7 @@ Status Service::restore_jobs() {
     BATON_TRY(LockKeeper(farm_).settle(document->parsed->job));
     BATON_TRY(LockKeeper(farm_).tell_again(document->parsed->job, id));
   }
-  BATON_TRY(farm_.archive_ended());
+  BATON_TRY(farm_.archive_ended(files_));
   BATON_TRY(farm_.count_kept());
   BATON_TRY(farm_.journal.commit());
   BATON_TRY(farm_.let_out());

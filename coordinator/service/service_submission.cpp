@@ -92,7 +92,7 @@ Status check_rights(FarmCore& farm, const Speaker& speaker, const ParsedJobDocum
 
 Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   // Jobs that ended in this turn of the loop are read from the archive, too.
-  BATON_TRY(farm_.archive_ended());
+  BATON_TRY(farm_.archive_ended(files_));
   // A job that cannot be run is refused before it leaves a trace.
   BATON_ASSIGN(const bool is_unread, await_documents(peer, message, {{}, {message.json}}));
   if (is_unread) return {};

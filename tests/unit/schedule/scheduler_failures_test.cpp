@@ -273,6 +273,25 @@ TEST(SchedulerFailures, ATaskThatNobodyThereCanDoWaitsForAnotherWorker) {
   DeadEnd().expect_that_it_is_done_by("c");
 }
 
+// Whoever makes a task again may have put its blob just before the old one is removed.
+TEST(SchedulerFailures, WhatATaskInWorkMadeBeforeIsNotRemoved) {
+  Farm farm(small_job(1, 2, 2));
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  const GrantLease first = farm.ask_one("a");
+  farm.finish(first);
+  farm.finish(farm.ask_one("a"));
+  const Digest film = outputs_of(farm.spec(), farm.job, first.lease.task).front().digest;
+  EXPECT_FALSE(farm.scheduler.is_referenced(film));
+  EXPECT_FALSE(farm.scheduler.is_made_again(film)) << "nobody works on it";
+  farm.step(TasksReopened{farm.job, {assemble(0), render(0, 0)}, "somebody wants it"});
+  const GrantLease again = farm.ask_one("a");
+  ASSERT_EQ(again.lease.task, first.lease.task);
+  EXPECT_TRUE(farm.scheduler.is_made_again(film));
+  farm.fail(again);
+  EXPECT_FALSE(farm.scheduler.is_made_again(film));
+}
+
 TEST(SchedulerFailures, AWorkerThatStartsAnewMayTryOnceMore) {
   DeadEnd().expect_that_it_is_done_by("a");
 }

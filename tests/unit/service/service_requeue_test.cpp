@@ -169,6 +169,34 @@ TEST_F(RequeueTest, ACancelledJobSaysThatItGoesOn) {
   EXPECT_EQ(finish(endpoint, worker, id), static_cast<int>(wanted.num_tasks));
 }
 
+// What was wanted again, and was not begun, is as it was.
+TEST_F(RequeueTest, AFrameThatIsNotMadeAgainStaysTheJobs) {
+  Busy farm(*this);
+  auto& [service, endpoint, worker, id] = farm;
+  finish(endpoint, worker, id);
+  const std::vector<FrameNumber> all{FrameNumber(1), FrameNumber(2), FrameNumber(3),
+                                     FrameNumber(4)};
+  submit(endpoint, all);
+  const auto before = ask<PictureSource>(endpoint, AskPicture{"test"});
+  EXPECT_EQ(before.frame, FrameNumber(4));
+  EXPECT_TRUE(before.is_written);
+  EXPECT_THAT(before.note, HasSubstr("as it was before"));
+  // One is gone, and one is another picture: those are not.
+  fs::remove(frame_path(job, FrameIndex(0)));
+  ASSERT_TRUE(write_file_atomic(frame_path(job, FrameIndex(1)), as_bytes_view("another")).ok());
+  ask<ShownJob>(endpoint, CancelJob{"test"});
+  const JobDetail detail = show(endpoint, id);
+  EXPECT_EQ(detail.summary.status, JobStatus::cancelled);
+  EXPECT_EQ(detail.frames_done, (std::vector<FrameNumber>{FrameNumber(3), FrameNumber(4)}));
+  EXPECT_EQ(detail.summary.frames_done, 2u);
+  EXPECT_EQ(detail.summary.tasks_done, 2u);
+  EXPECT_EQ(ask<PictureSource>(endpoint, AskPicture{"test"}).frame, FrameNumber(4));
+  // What is not there is made: two frames of two tiles in one run.
+  submit(endpoint);
+  EXPECT_EQ(show(endpoint, id).frames_done.size(), 2u);
+  EXPECT_EQ(finish(endpoint, worker, id), 4);
+}
+
 TEST_F(RequeueTest, LockedAndUnknownFramesAreRefused) {
   Busy farm(*this);
   auto& [service, endpoint, worker, id] = farm;
@@ -240,7 +268,7 @@ TEST_F(RequeueTest, WhatComesOutOtherwiseIsToldWhateverCameBetween) {
         between == Between::cancel_and_retry || between == Between::retry_and_restart;
     if (is_retried) {
       ask<ShownJob>(service->endpoint(), CancelJob{"test"});
-      submit(service->endpoint());
+      submit(service->endpoint(), {FrameNumber(3)});
     }
     if (between == Between::restart || between == Between::retry_and_restart)
       service.emplace(options);
