@@ -40,7 +40,8 @@ std::set<FrameIndex> former_frames(const Scheduler::Job* job, const FileTable& f
     const FileState state = files.judge(path, former.front()).state;
     const auto stamp = stamp_of(path);
     const bool has_size = stamp && *stamp && (*stamp)->size_bytes == former.front().size_bytes;
-    if (state == FileState::right || (state == FileState::unknown && has_size)) frames.insert(frame);
+    if (state == FileState::right || (state == FileState::unknown && has_size))
+      frames.insert(frame);
   }
   return frames;
 }

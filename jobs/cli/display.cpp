@@ -140,7 +140,7 @@ void add_radiance_options(CLI::App& command, DisplayOptions& options) {
       .add_option("--curve", options.curve,
                   "none: what is brighter than 1 is white; filmic: bright light fades to white; "
                   "default: none")
-      ->transform(CLI::Transformer(curves).description("none|filmic"))
+      ->transform(CLI::CheckedTransformer(curves).description("{none,filmic}"))
       ->default_str("");
 }
 

@@ -84,9 +84,8 @@ Result<ExitCode> picture(const PictureOptions& options) {
     fmt::print("{}\n", json_text(row, 2));
     return ExitCode::ok;
   }
-  const std::string part = source.is_written
-                               ? source.file
-                               : fmt::format("{} of {} tiles", num_tiles, source.num_tiles);
+  const std::string part =
+      source.is_written ? source.file : fmt::format("{} of {} tiles", num_tiles, source.num_tiles);
   say("{}  frame {}, {}{}; {}\n", out.string(), source.frame, part, source.note, shown.how);
   return ExitCode::ok;
 }

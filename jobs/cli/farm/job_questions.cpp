@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
+#include <map>
 #include <optional>
+#include <tuple>
 
+#include "common/base/legible.h"
 #include "common/base/limits.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/farm/worker_text.h"
@@ -105,7 +108,20 @@ Result<ExitCode> show_tasks(const TasksOptions& options) {
     fmt::print("{}\n", json_text(rows, 2));
     return ExitCode::ok;
   }
-  for (const ListedTask& task : found.tasks) say("{}\n", task_line(task));
+  // Failures that say the same are told once, in the place of the last.
+  using Failed = std::tuple<JobId, std::string, std::string>;
+  const auto failed_of = [](const ListedTask& task) {
+    return Failed(task.job, task.worker, first_line(task.message));
+  };
+  std::map<Failed, std::size_t> alike, still;
+  for (const ListedTask& task : found.tasks) alike[failed_of(task)] += task.has_failed ? 1 : 0;
+  still = alike;
+  for (const ListedTask& task : found.tasks) {
+    if (task.has_failed && --still[failed_of(task)] > 0) continue;
+    say("{}\n", task_line(task));
+    if (const std::size_t count = alike[failed_of(task)]; task.has_failed && count > 1)
+      say("  {} attempts failed so, this is the last\n", count);
+  }
   say("{} tasks{}\n", found.tasks.size(),
       options.job.empty() ? " of jobs that have not ended" : "");
   return ExitCode::ok;

@@ -53,7 +53,8 @@ void add_key_command(CLI::App& app, ExitCode& code) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, Role>{{"worker", Role::worker},
                                                                       {"viewer", Role::viewer},
                                                                       {"user", Role::user},
-                                                                      {"admin", Role::admin}}))
+                                                                      {"admin", Role::admin}})
+                      .description("{worker,viewer,user,admin}"))
       ->option_text("ROLE=user");
   made->callback([options, &code] { code = finish(create(*options)); });
   added->callback([options, &code] { code = finish(add(*options)); });
