@@ -69,7 +69,7 @@ inline constexpr int kMaxFineSites = 256;  ///< sites of pixels whose geometry i
 inline constexpr int kGeometryProbes = 4;
 inline constexpr int kMaxRounds = 65536;
 inline constexpr int kMaxPreroll = 64;  ///< rounds
-inline constexpr int kMaxBounces = 64;
+inline constexpr int kMaxBounces = 64, kPresetBounces = 4;
 /// Paths of a pixel and round, for light between surfaces; and of one that shares what they find.
 inline constexpr int kBouncePaths = 16, kSharedBouncePaths = 4;
 /// Side of the blocks of pixels in which they share, a quarter of a block at a time; tiles are

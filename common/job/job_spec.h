@@ -182,7 +182,7 @@ struct EnvironmentSpec {
 // ---- light between surfaces --------------------------------------------------------------------
 struct LightSpec {
   /// Most surfaces that light meets on its way, beside the one that is seen, [0,
-  /// limits::kMaxBounces].
+  /// limits::kMaxBounces]. A job file that does not say has limits::kPresetBounces (preset_job).
   int bounces = 0;
   /// Glossy surfaces that are seen by way of rough ones are rougher (worker/bounce).
   bool filter_glossy = true;

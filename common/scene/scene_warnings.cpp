@@ -68,12 +68,17 @@ void warn_of_names(const SceneSpec& scene, const std::set<std::string>& used,
 
 }  // namespace
 
-std::vector<std::string> scene_warnings(const SceneSpec& scene) {
+std::vector<std::string> scene_warnings(const JobSpec& job) {
+  const SceneSpec& scene = job.scene;
   std::vector<std::string> warnings;
   const std::set<std::string> used = used_materials(scene);
   for (const auto& [name, material] : scene.materials) {
     if (used.contains(name) && !(material.emission == Rgb{}))
-      warnings.push_back(fmt::format("material \"{}\": it glows, but lights nothing", name));
+      warnings.push_back(fmt::format("material \"{}\": it glows, {}", name,
+                                     job.light.bounces == 0
+                                         ? "but lights nothing, as light.bounces is 0"
+                                         : "and lights what finds it by chance: small lamps are "
+                                           "noisy, and better put into the map"));
   }
 
   std::set<std::string> paths, parts, names;

@@ -10,7 +10,7 @@ FOREIGN_ISA = "sse4"  # of workers that render other last bits than those of thi
 
 KINDS = {
     "rest": {"frames": "1-8", "sampling": {"method": "sequential", "numCandidates": 256, "numDistributions": 12}},
-    "motion": {"frames": "1-6", "sampling": {"method": "pool", "numParticles": 32, "numCandidates": 512},
+    "motion": {"frames": "1-6", "light": {"bounces": 2}, "sampling": {"method": "pool", "numParticles": 32, "numCandidates": 512},
                "camera": camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (6, [0.5, 1.3, 4.6], [0, 0.6, 0]))},
     "second-pass": {"frames": "1-5", "sampling": {"method": "bidirectional", "numCandidates": 512},
                     "visibility": {"correlated": True}},

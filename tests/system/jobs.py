@@ -16,6 +16,7 @@ def make_job(folder, **changes):
         "frames": "1-6",
         "seed": 7,
         "image": {"width": 160, "height": 96, "sites": 1, "tileSize": 64},
+        "light": {"bounces": 0},
         "camera": {"position": [0, 1.2, 5], "lookAt": [0, 0.6, 0], "verticalFovDeg": 35},
         "scene": {
             "materials": {

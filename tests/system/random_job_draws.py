@@ -7,7 +7,7 @@ import random
 from random_job_means import tame
 from random_job_motion import Motion
 from random_job_pictures import Pictures
-from random_job_rules import mend, spoil, whole_blocks, work_of
+from random_job_rules import mend, spoil, work_of
 from random_job_schema import SchemaDraw
 from random_job_textures import Textures
 
@@ -164,10 +164,8 @@ class Draw(Motion, Pictures, Textures):
     def side(self):
         return self.pick(20, 24, 33, 40) if self.plain else self.pick(1, 1, 2, 5, 8, 9, 16, 17, 24, 33, 40)
 
-    def tile_size(self, job=None):
-        size = self.pick(8, 8, 9, 13, 16, 19, 64, 32768)
-        in_blocks = job and ("adaptiveThreshold" in job.get("quality", {}) or job.get("light", {}).get("bounces"))
-        return whole_blocks(size) if in_blocks else size
+    def tile_size(self):
+        return self.pick(8, 8, 9, 13, 16, 19, 64, 32768)
 
     def method(self):
         methods = self.enum("sampling", "method")
@@ -328,7 +326,7 @@ class Draw(Motion, Pictures, Textures):
 
     def split(self, job):
         """What never changes the picture."""
-        split = {"tileSize": self.tile_size(job), "workers": self.pick(1, 1, 2), "threads": self.pick(1, 2),
+        split = {"tileSize": self.tile_size(), "workers": self.pick(1, 1, 2), "threads": self.pick(1, 2),
                  "checkpointEvery": self.pick(1, 2, 3, 12, 1000)}
         if job["image"]["width"] * job["image"]["height"] > 600 and split["tileSize"] < 13:
             split["tileSize"] = 16
@@ -337,7 +335,7 @@ class Draw(Motion, Pictures, Textures):
     def interruption(self, job):
         """Somebody dies after some seconds; then all is started again, maybe with other tiles."""
         return {"who": self.pick("render", "render", "worker", "worker", "coordinator", "all"),
-                "after": round(self.rng.uniform(0.02, 0.4), 3), "tileSize": self.pick(None, None, self.tile_size(job))}
+                "after": round(self.rng.uniform(0.02, 0.4), 3), "tileSize": self.pick(None, None, self.tile_size())}
 
 
 def draw_case(schema, seed, number):

@@ -22,7 +22,7 @@ def work_of(job, num_frames):
     if job.get("visibility", {}).get("correlated"):
         visibility = job["visibility"]
         of_pixel += n * visibility.get("partitions", 16)
-    of_pixel += 16 * 12 * job.get("light", {}).get("bounces", 0)
+    of_pixel += 16 * 12 * job.get("light", {}).get("bounces", 4)
     rounds = job.get("quality", {}).get("rounds", 1)
     if rounds == 1 and {"variance", "denoise"} & set(job["output"].get("aovs", [])):
         of_pixel *= 2
@@ -48,11 +48,6 @@ def mend_view(view, rng):
         if math.hypot(*cross) > 1e-3 * math.hypot(*way) * math.hypot(*up) > 0:
             return
         view["position"] = [round(p + rng.uniform(-1, 1), 3) for p in view["position"]]
-
-
-def whole_blocks(tile_size):
-    """Tiles in which blocks of pixels can have numbers of rounds of their own."""
-    return (tile_size + 7) // 8 * 8
 
 
 def is_correlated(job):
@@ -112,13 +107,6 @@ def adaptive_rounds(job, _rng):
     quality, image = job.get("quality", {}), job["image"]
     if quality.get("rounds", 1) < 3 or job["sampling"]["method"] in ("sequential", "restir"):
         quality.pop("adaptiveThreshold", None)
-    if "adaptiveThreshold" in quality and "tileSize" in image:
-        image["tileSize"] = whole_blocks(image["tileSize"])
-
-
-def whole_blocks_share_light(job, _rng):
-    if job.get("light", {}).get("bounces") and "tileSize" in job["image"]:
-        job["image"]["tileSize"] = whole_blocks(job["image"]["tileSize"])
 
 
 def more_sites_in_later_rounds(job, rng):
@@ -170,7 +158,7 @@ def one_kind_of_motion(job, _rng):
 
 RULES = [at_least_as_many_candidates_as_particles, compensation_is_of_mis, one_target_and_only_of_auto,
          a_second_pass_of_few_methods, one_round_with_a_second_pass_or_auto, adaptive_rounds,
-         whole_blocks_share_light, more_sites_in_later_rounds,
+         more_sites_in_later_rounds,
          two_folds_are_of_one_size, no_catchers_with_a_second_pass, what_arrives_is_known,
          shadows_in_alpha_of_what_is_transparent, one_kind_of_motion]
 

@@ -66,7 +66,7 @@ def textures_are_said_and_part_of_the_job(programs, folder):
     """`check` says what is not as in the file; another image is another picture; a damaged one is one error."""
     path = write_job(folder / "job.json", set_job(folder, textured=True))
     said = programs.run("baton", "check", path).stdout
-    check('material "clay": it glows, but lights nothing' in said, said)
+    check('material "clay": it glows, but lights nothing, as light.bounces is 0' in said, said)
     check("textures are not read" not in said, said)
     (folder / "wood.png").write_bytes(png(2, 2, lambda x, y: (100 * x, 50 * y, 9)))
     job = make_job(folder)

@@ -15,8 +15,11 @@ struct BounceGroup {
   static constexpr std::uint32_t kMembers = limits::kBounceMembers;
   static_assert(kSide * kSide == limits::kBounceMembers);
 
-  RngKey block;              ///< of the block's first pixel
-  std::uint32_t number = 0;  ///< [0, 4)
+  static constexpr std::uint32_t kOfBlock = 4;
+
+  RngKey block;  ///< of the block's first pixel
+  /// [0, kOfBlock), and as many again of those that share beside them.
+  std::uint32_t number = 0;
   /// [0, kMembers), another one for each pixel of a group: the same in all rounds.
   std::uint32_t member = 0;
 

@@ -84,8 +84,6 @@ class Turns {
   std::size_t last_;
 };
 
-bool sees_surface(const SurfaceHit& hit) { return hit.hit && !hit.is_catcher; }
-
 }  // namespace
 
 /// The surfaces that some paths have met.
@@ -147,7 +145,7 @@ void BounceWalk::add_own(std::uint32_t pixel, const BounceStart& start, std::uin
   std::array<std::uint32_t, kPaths> number;
   for (std::uint32_t k = first_path; k < kPaths; ++k) {
     const std::size_t site = turns[k - first_path];
-    if (!sees_surface(start.hits[site])) continue;
+    if (!start.hits[site].hit) continue;
     const auto u = points[start.key.round * kPaths + k];
     number[first.count] = k;
     first.add(site, u[0], u[1]);
@@ -190,7 +188,7 @@ void BounceWalk::add_member(std::uint32_t pixel, const BounceStart& start) {
   std::array<std::uint32_t, kSharedPaths> number;
   for (std::uint32_t k = 0; k < kSharedPaths; ++k) {
     const std::size_t site = turns[k];
-    if (!sees_surface(start.hits[site])) continue;
+    if (!start.hits[site].hit) continue;
     // A pixel has another point of its group's each time, and so has each of its sites.
     const std::uint32_t turn = start.key.round * kSharedPaths + k;
     const std::uint32_t member = (group.member + turn + start.key.round) % kMembers;

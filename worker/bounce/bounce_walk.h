@@ -16,13 +16,13 @@ struct SurfaceCandidate;
 
 /// What a pixel's paths begin with.
 struct BounceStart {
-  const SiteBlock& sites;            ///< at least one of them sees a surface
+  const SiteBlock& sites;            ///< at least one of them sees a surface, or a catcher
   std::span<const SurfaceHit> hits;  ///< (S) what they are made of
   /// Candidates for the light of all surfaces on the way; must outlive the walk.
   const PresampledLight& presampled;
   RngKey key;  ///< of the pixel in its round
   /// Who shares what it finds.
-  BounceGroup group;
+  BounceGroup group = {};
   /// A draw that no image has (noise_probe.h): with points of its own.
   bool is_aside = false;
 };

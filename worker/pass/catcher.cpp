@@ -65,15 +65,12 @@ Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, Catc
     if (hits_[s].hit) origins.set(s, hits_[s].ray_origin);
   }
   gather_sites(*input.geometry, hits_, {}, sites_, albedo);
-  // Random numbers of pixels that no image has.
-  RngKey key = input.key;
-  key.pixel ^= 0x80000000u;
   const AsideSampler::Aside catcher{.sites = sites_,
                                     .hits = hits_,
                                     .origins = origins,
                                     .light = input.light,
                                     .presampled = input.presampled,
-                                    .key = key,
+                                    .key = key_of(input),
                                     .starts_afresh = true};
   return aside_.sample(method, input, catcher, {pixel.tile, pixel.index, true}) +
          dark_share(hits_, sites_);

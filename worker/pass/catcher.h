@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "worker/bounce/bounce_walk.h"
 #include "worker/light/frame_light.h"
 #include "worker/pass/aside.h"
 #include "worker/pass/render_context.h"
@@ -39,8 +40,19 @@ class CatcherEdge {
   /// The share of the light that arrives, times that of the sites. input: the pixel's own.
   Rgb sample(const PixelMethod& method, const PixelInput& input, CatcherAlbedo& albedo,
              const PixelState& pixel);
+  /// What paths from these sites begin with, after sample(); until the next one.
+  BounceStart start(const PixelInput& input) const {
+    return {sites_, hits_, input.presampled, key_of(input), {}};
+  }
 
  private:
+  /// Random numbers of pixels that no image has.
+  static RngKey key_of(const PixelInput& input) {
+    RngKey key = input.key;
+    key.pixel ^= 0x80000000u;
+    return key;
+  }
+
   std::vector<SurfaceHit> hits_;
   SiteBlock sites_;
   AsideSampler aside_;

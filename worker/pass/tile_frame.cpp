@@ -144,7 +144,9 @@ void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, s
   const std::size_t slot = batch.slots[i];
   PixelResult& result = batch.pixels[i];
   const auto sample_edge = [&] {
-    return edge_.sample(context_.method, input, work.catchers, pixel);
+    const Rgb arrives = edge_.sample(context_.method, input, work.catchers, pixel);
+    start_bounces(work, edge_.start(input), PixelBatch::kOnEdge + i, pixel.index, true);
+    return arrives;
   };
   if (pixel.sees_catcher && work.at.goes_on && belongs_to_object(pixel.tile, pixel.index)) {
     result.shadow = sample_edge();
@@ -167,7 +169,9 @@ void TileFrameRenderer::sample_pixel(RoundWork& work, const PixelInput& input, s
     }
   }
 
-  start_bounces(work, input, i, pixel, batch);
+  start_bounces(work, {input.sites, input.hits, input.presampled, input.key}, i, pixel.index,
+                pixel.sees_catcher);
+  if (!pixel.sees_catcher) start_bounces_again(work, input, i, pixel.index, batch);
 
   // Count what the method did.
   result.lns = did.lns;
@@ -183,28 +187,35 @@ void TileFrameRenderer::note_again(const RoundWork& work, PixelBatch& batch) con
   if (!bounces_ || !work.probe_light) return;
   for (const std::uint32_t slot : batch.slots) {
     const std::size_t index = work.at.surfaces.pixels.index(slot);
-    if (!is_drawn_again(work, index)) continue;
+    if (!is_drawn_again(work, index) || work.at.surfaces.sees_catcher(slot)) continue;
     const BounceGroup group = work.group(index);
     if (!batch.has_again(group)) batch.groups_again.push_back(group);
   }
 }
 
-/// The paths of a pixel, and those of its other draw. i: number of the pixel in its batch.
-void TileFrameRenderer::start_bounces(RoundWork& work, const PixelInput& input, std::size_t i,
-                                      const PixelState& pixel, const PixelBatch& batch) {
-  if (!bounces_ || pixel.sees_catcher || work.at.round < Round(0)) return;
-  const auto number = static_cast<std::uint32_t>(i);
-  const BounceGroup group = work.group(pixel.index);
-  bounces_->add(number, {input.sites, input.hits, input.presampled, input.key, group});
-  if (!batch.has_again(group)) return;
-  const auto [x, y] = work.at.surfaces.rect.place(pixel.index);
-  bounces_->add(number + PixelBatch::kMost,
+/// Paths from sites of a pixel, which add to `number` of PixelBatch::indirect. Those of catchers
+/// share with others, so that objects are as without them.
+void TileFrameRenderer::start_bounces(const RoundWork& work, BounceStart start, std::size_t number,
+                                      std::size_t index, bool on_catchers) {
+  if (!bounces_ || work.at.round < Round(0)) return;
+  start.group = work.group(index);
+  if (on_catchers) start.group.number += BounceGroup::kOfBlock;
+  bounces_->add(static_cast<std::uint32_t>(number), start);
+}
+
+/// Those of the other draw of a pixel, where somebody of its group has one.
+void TileFrameRenderer::start_bounces_again(const RoundWork& work, const PixelInput& input,
+                                            std::size_t i, std::size_t index,
+                                            const PixelBatch& batch) {
+  if (batch.groups_again.empty() || !batch.has_again(work.group(index))) return;
+  const auto [x, y] = work.at.surfaces.rect.place(index);
+  start_bounces(work,
                 {.sites = input.sites,
                  .hits = input.hits,
                  .presampled = work.probe_light->frame.presampled->of(x, y),
                  .key = probe_key(input.key),
-                 .group = group,
-                 .is_aside = true});
+                 .is_aside = true},
+                PixelBatch::kAgain + i, index, false);
 }
 
 /// Another draw of the pixel, where its error is to be told.
@@ -254,12 +265,13 @@ void TileFrameRenderer::shade(RoundWork& work, SampleState& state, PixelBatch& b
     pixel.blocked = known.unshadowed ? *known.unshadowed - pixel.radiance : found.blocked;
     pixel.indirect = batch.indirect[i];
     pixel.radiance += pixel.indirect;
+    pixel.shadow += batch.indirect[PixelBatch::kOnEdge + i];
 
     // Another draw tells the error of this one.
     pixel.variance = known.variance;
     pixel.error = kErrorUnknown;
     if (batch.again[i]) {
-      const Rgb again = *batch.again[i] + batch.indirect[PixelBatch::kMost + i];
+      const Rgb again = *batch.again[i] + batch.indirect[PixelBatch::kAgain + i];
       const Rgb difference = pixel.radiance - again;
       if (draws_twice_) pixel.variance = difference * difference * 0.5f;
       if (work.is_probe(index))

@@ -54,8 +54,10 @@ class TileFrameRenderer {
     return work.probe_light && (draws_twice_ || work.is_probe(index));
   }
   void note_again(const RoundWork& work, PixelBatch& batch) const;
-  void start_bounces(RoundWork& work, const PixelInput& input, std::size_t i,
-                     const PixelState& pixel, const PixelBatch& batch);
+  void start_bounces(const RoundWork& work, BounceStart start, std::size_t number,
+                     std::size_t index, bool on_catchers);
+  void start_bounces_again(const RoundWork& work, const PixelInput& input, std::size_t i,
+                           std::size_t index, const PixelBatch& batch);
 
   /// The method of a slot's first surface: its material's own, or the job's.
   const PixelMethod& method_of(const TileSurfaces& surfaces, std::size_t slot) const;

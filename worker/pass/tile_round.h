@@ -78,8 +78,10 @@ struct PixelBatch {
   Column<PixelResult> pixels;        ///< what the film gets
   Column<Rgb> emission;              ///< emission of what pixels see
   Column<std::optional<Rgb>> again;  ///< radiance once more, where it is wanted
-  /// What comes by other surfaces; the second half: once more, as `again`.
-  std::array<Rgb, 2 * kMost> indirect;
+  /// What comes by other surfaces; then once more, as `again`; then on the sites on catchers of
+  /// pixels that belong to objects.
+  std::array<Rgb, 3 * kMost> indirect;
+  static constexpr std::size_t kAgain = kMost, kOnEdge = 2 * kMost;  ///< where these begin
   /// Groups of the pixels that are drawn again.
   std::vector<BounceGroup> groups_again;
 

@@ -94,7 +94,7 @@ TileGrid::TileGrid(const PixelRect& image, int tile_size)
     : image_(image),
       x0_(aligned(image.x0)),
       y0_(aligned(image.y0)),
-      tile_size_((tile_size + PixelBlocks::kSide - 1) / PixelBlocks::kSide * PixelBlocks::kSide),
+      tile_size_((tile_size + kAlign - 1) / kAlign * kAlign),
       columns_(column_of(image.x1 - 1) + 1),
       rows_(row_of(image.y1 - 1) + 1) {
   BATON_CHECK(image.width() > 0 && image.height() > 0 && tile_size > 0);

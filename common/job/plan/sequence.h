@@ -57,13 +57,14 @@ std::vector<FrameSpec> expand_sequence(const JobSpec& job);
 
 /// The rendered pixels cut into square tiles, row by row; border tiles are clipped. The first tile
 /// begins at a multiple of kAlign pixels of the picture, wherever what is rendered of it begins,
-/// and their side is a multiple of a block's: all consist of whole blocks of the picture.
+/// and their side is one: all consist of whole blocks of the picture, in which pixels share.
 class TileGrid {
  public:
-  static constexpr std::int32_t kAlign = limits::kAdaptiveBlock;
-  static_assert(kAlign % PixelBlocks::kSide == 0);
+  static constexpr std::int32_t kAlign = 8;
+  static_assert(kAlign % PixelBlocks::kSide == 0 && kAlign % limits::kAdaptiveBlock == 0 &&
+                kAlign % limits::kBounceBlock == 0);
 
-  /// tile_size: > 0, rounded up to a multiple of PixelBlocks::kSide.
+  /// tile_size: > 0, rounded up to a multiple of kAlign.
   TileGrid(const PixelRect& image, int tile_size);
   explicit TileGrid(const ImageSpec& image) : TileGrid(image.rendered(), image.tile_size) {}
 

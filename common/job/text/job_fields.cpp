@@ -253,9 +253,6 @@ void check_adaptive(JobArchive& a, const JobSpec& job) {
   } else if (!rounds_have_own_sites(job)) {
     refuse(fmt::format("the rounds of {} go on from each other where it carries samples",
                        traits(job.sampling.method).name));
-  } else if (job.image.tile_size % limits::kAdaptiveBlock != 0) {
-    refuse(fmt::format("image.tileSize, {}, is no multiple of {}", job.image.tile_size,
-                       limits::kAdaptiveBlock));
   }
 }
 
@@ -273,16 +270,6 @@ void check_max_sites(JobArchive& a, const JobSpec& job) {
     refuse(fmt::format("the samples that {} carries belong to sites",
                        traits(job.sampling.method).name));
   }
-}
-
-/// Whether light between surfaces can be rendered.
-void check_bounces(JobArchive& a, const JobSpec& job) {
-  if (job.light.bounces == 0) return;
-  if (job.image.tile_size % limits::kBounceBlock != 0)
-    a.fault("light",
-            fmt::format("bounces 0, as image.tileSize, {}, is no multiple of {}",
-                        job.image.tile_size, limits::kBounceBlock),
-            std::to_string(job.light.bounces));
 }
 
 /// Whether the method says what light would arrive if none were blocked.
@@ -325,7 +312,6 @@ void check_whole(JobArchive& a, const JobSpec& job) {
   }
   check_adaptive(a, job);
   check_max_sites(a, job);
-  check_bounces(a, job);
   check_unshadowed(a, job);
   const JobEstimate estimate = estimate_job(job);
   if (estimate.tasks() > limits::kMaxTasksPerJob) {

@@ -54,18 +54,17 @@ std::string write(T value, int indent) {
   return dump(writer.json(), indent);
 }
 
-/// Reads a T; `defaulted`, where wanted, gets the paths of the values that the text does not give.
-template <class T>
-Result<T> read(std::string_view text, const std::string& name,
-               const std::filesystem::path& base_directory,
-               const std::vector<JobOverride>& overrides = {},
-               std::set<std::string>* defaulted = nullptr) {
+/// Reads a job, which is `job` where the text says nothing; `defaulted`, where wanted, gets the
+/// paths of what it does not say.
+Result<JobSpec> read(std::string_view text, const std::string& name,
+                     const std::filesystem::path& base_directory, JobSpec job,
+                     const std::vector<JobOverride>& overrides = {},
+                     std::set<std::string>* defaulted = nullptr) {
   BATON_ASSIGN(json root, parse_json_text(text, name));
-  T value;
   JobJsonReader reader(name, base_directory, overrides);
-  BATON_TRY(reader.read(std::move(root), [&] { fields(reader, value); }));
+  BATON_TRY(reader.read(std::move(root), [&] { fields(reader, job); }));
   if (defaulted != nullptr) *defaulted = reader.defaulted();
-  return value;
+  return job;
 }
 
 /// Digests of all files; one error names each that cannot be read.
@@ -123,14 +122,20 @@ Status expect_all_assets(const ParsedJobDocument& document) {
 }  // namespace
 
 Result<JobSpec> parse_job(std::string_view text, const std::string& name,
-                          const std::filesystem::path& base_directory) {
-  return read<JobSpec>(text, name, base_directory);
+                          const std::filesystem::path& base_directory, JobSpec preset) {
+  return read(text, name, base_directory, std::move(preset));
+}
+
+JobSpec preset_job() {
+  JobSpec job;
+  job.light.bounces = limits::kPresetBounces;
+  return job;
 }
 
 Result<JobSpec> load_job(const std::filesystem::path& path,
                          const std::vector<JobOverride>& overrides) {
   BATON_ASSIGN(const std::string text, read_job_text(path));
-  return read<JobSpec>(text, path.string(), path.parent_path(), overrides);
+  return read(text, path.string(), path.parent_path(), preset_job(), overrides);
 }
 
 std::string to_json(const JobSpec& job) { return write(job, 2); }
@@ -140,7 +145,7 @@ Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path,
   BATON_ASSIGN(const std::string text, read_job_text(path));
   std::set<std::string> defaulted;
   BATON_ASSIGN(const JobSpec job,
-               read<JobSpec>(text, path.string(), path.parent_path(), overrides, &defaulted));
+               read(text, path.string(), path.parent_path(), preset_job(), overrides, &defaulted));
   std::vector<JobSetting> settings;
   collect_settings(ordered_json::parse(to_json(job)), "$", defaulted, true, settings);
   return settings;

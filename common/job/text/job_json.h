@@ -11,12 +11,17 @@
 
 namespace baton {
 
-/// The job of a JSON text. name goes first in every error line (usually the file); relative paths
-/// are taken relative to base_directory. One Error lists every fault, one per line: `job.json:
+/// What a job file says that says nothing: JobSpec, with light between surfaces. (Documents say
+/// everything but what came after them, and that is as it was then.)
+JobSpec preset_job();
+
+/// The job of a JSON text, which is `preset` where it says nothing. name goes first in every error
+/// line (usually the file); relative paths are taken relative to base_directory. One Error lists
+/// every fault, one per line: `job.json:
 /// $.image.width: expected an integer in [1, 32768], got "wide"`; an unknown key names the likely
 /// one. Schema: jobs/schema/job.schema.json.
 Result<JobSpec> parse_job(std::string_view json, const std::string& name,
-                          const std::filesystem::path& base_directory);
+                          const std::filesystem::path& base_directory, JobSpec preset = {});
 
 /// A value that is said in place of the job file's.
 struct JobOverride {
@@ -26,8 +31,8 @@ struct JobOverride {
   std::string option = "--set";  ///< named in faults
 };
 
-/// Reads and parses a job file, with `overrides` put into its JSON, the last one last. Faults of
-/// what was put in name the option instead of the file.
+/// Reads and parses a job file, which is preset_job() where it says nothing, with `overrides` put
+/// into its JSON, the last one last. Faults of what was put in name the option instead of the file.
 Result<JobSpec> load_job(const std::filesystem::path& path,
                          const std::vector<JobOverride>& overrides = {});
 

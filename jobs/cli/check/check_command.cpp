@@ -2,6 +2,7 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <tuple>
 
 #include "common/base/machine_memory.h"
@@ -16,6 +17,7 @@
 #include "common/scene/settle/settle_motion.h"
 #include "jobs/auto/unit_costs.h"
 #include "jobs/cli/check/asset_report.h"
+#include "jobs/cli/check/bounce_share.h"
 #include "jobs/cli/check/job_warnings.h"
 #include "jobs/cli/check/scene_preview.h"
 #include "jobs/cli/check/surface_share.h"
@@ -60,7 +62,7 @@ ordered_json map_json(const MapReport& map) {
 void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& assets,
                 const std::vector<AnimationUse>& animations,
                 const std::vector<std::string>& warnings, const std::vector<JobSetting>& settings,
-                const PilotPlan& plan) {
+                const PilotPlan& plan, const std::optional<BounceShare>& bounces) {
   ordered_json maps = ordered_json::array(), plates = ordered_json::array(),
                moving = ordered_json::array();
   for (const AnimationUse& use : animations) {
@@ -109,6 +111,12 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                        {"frames", plan.frames},
                        {"pixels", plan.pixels},
                        {"cpuSeconds", plan.cpu_seconds}};
+  }
+  if (bounces) {
+    result["bounces"] = {{"adds", bounces->whole}};
+    if (!bounces->material.empty())
+      result["bounces"].update(
+          {{"mostOn", bounces->material}, {"addsThere", bounces->of_material}});
   }
   if (!settings.empty()) result["settings"] = settings_json(settings);
   fmt::print("{}\n", json_text(result, 2));
@@ -251,11 +259,20 @@ Result<ExitCode> run_check(const CheckOptions& options) {
       job.sampling.method == Method::automatic
           ? plan_pilot(job, ray_cost_factor(assets.triangles, assets.objects_move))
           : PilotPlan{};
+  std::optional<BounceShare> bounces;
+  if (job.light.bounces > 0) {
+    Result<BounceShare> found = bounce_share(job);
+    if (found) bounces = std::move(found).value();
+    if (!found && found.error().kind == ErrorKind::cancelled) return found.error();
+    if (!found)
+      warnings.push_back("what light between surfaces adds is not known: " + found.error().message);
+  }
   if (options.json) {
     BATON_TRY(write_preview(options, job, *assets.scene));
-    print_json(job, estimate, assets, animations, warnings, settings, plan);
+    print_json(job, estimate, assets, animations, warnings, settings, plan, bounces);
   } else {
     print_text(job, estimate, assets, animations);
+    if (bounces) say("bounces    light between surfaces adds {}\n", text_of(*bounces));
     if (job.sampling.method == Method::automatic)
       say("pilot      before the first frame: {}\n", pilot_text(plan));
     BATON_TRY(write_preview(options, job, *assets.scene));

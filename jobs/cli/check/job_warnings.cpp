@@ -109,8 +109,8 @@ void bounce_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
     warnings.push_back("light.filterGlossy: no effect, as light.bounces is 0");
   if (const std::string key = catcher_key(job); job.light.bounces > 0 && !key.empty())
     warnings.push_back(fmt::format(
-        "light.bounces: {}: what catches shadows neither reflects light between surfaces, nor "
-        "receives it",
+        "light.bounces: {}: what catches shadows receives light between surfaces, and neither "
+        "reflects nor blocks it",
         key));
 }
 
@@ -146,7 +146,7 @@ double share_of_outline(JobSpec job) {
 void text_warnings(const JobSpec& job, bool light_jumps, const std::function<double()>& share,
                    std::vector<std::string>& warnings) {
   append(limit_warnings(job, light_jumps), warnings);
-  append(scene_warnings(job.scene), warnings);
+  append(scene_warnings(job), warnings);
   aov_warnings(job, warnings);
   bounce_warnings(job, warnings);
   idle_camera_warnings(job.camera, warnings);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <thread>
 
 #include "common/image/contact_sheet.h"
@@ -200,6 +201,12 @@ void print_noise(const std::vector<Compared>& jobs, std::size_t width) {
       "FLIP between the seeds\n");
 }
 
+std::string bounces_text(int bounces) {
+  return bounces == 0
+             ? std::string("direct light alone")
+             : fmt::format("light by up to {} surfaces beside the one that is seen", bounces);
+}
+
 void print_table(const std::vector<Compared>& jobs, bool with_noise, const fs::path& sheet) {
   std::size_t width = 5;
   for (const Compared& compared : jobs) width = std::max(width, compared.job.name.size());
@@ -210,6 +217,12 @@ void print_table(const std::vector<Compared>& jobs, bool with_noise, const fs::p
         compared.job.output.directory, compared.job.output.pattern);
   }
   say("handed on: sample state, packed, from frame to frame\n");
+  std::set<int> bounces;
+  for (const Compared& compared : jobs) bounces.insert(compared.job.light.bounces);
+  for (const Compared& compared : jobs) {
+    if (bounces.size() > 1)
+      say("{:<{}}  {}\n", compared.job.name, width, bounces_text(compared.job.light.bounces));
+  }
   if (with_noise) print_noise(jobs, width);
   say("sheet, a row for each job: {}\n", sheet.string());
 }

@@ -55,7 +55,7 @@ def job_of(options, scene, height):
     job = {"specificationVersion": 1, "name": "gltf", "frames": str(options.frame),
            "image": {"width": options.width * options.fine, "height": height * options.fine, "sites": 16},
            "scene": {"gltf": {"file": str(scene)}}, "environment": {"map": str(options.map.resolve()), "filter": "bilinear"},
-           "quality": {"rounds": options.rounds},
+           "light": {"bounces": 0}, "quality": {"rounds": options.rounds},
            "output": {"directory": "frames", "compression": "none", "pixelType": "float", "clampNegative": False,
                       "aovs": ["object", "material"]}}
     if options.catcher:

@@ -46,16 +46,6 @@ TEST(Quality, FineSitesAreForMethodsWhoseSamplesBelongToNone) {
             "belong to sites, got 64");
 }
 
-TEST(Quality, LightBetweenSurfacesNeedsWholeBlocks) {
-  EXPECT_EQ(quality_faults(R"("light": {"bounces": 4}, "image": {"tileSize": 24})"), "");
-  EXPECT_EQ(quality_faults(R"("light": {"bounces": 4}, "image": {"tileSize": 20})"),
-            "job.json: $.light: expected bounces 0, as image.tileSize, 20, is no multiple of 8, "
-            "got 4");
-  EXPECT_EQ(quality_faults(R"("light": {"bounces": 1}, "sampling": {"method": "mis"},
-                      "visibility": {"correlated": true})"),
-            "");
-}
-
 TEST(Quality, SweepsAreBoundedAndNoiseMustBeKnown) {
   EXPECT_EQ(quality_faults(R"("quality": {"sweeps": 3, "noiseThreshold": 0.01, "maxRounds": 64})"),
             "");
@@ -69,10 +59,6 @@ TEST(Quality, SweepsAreBoundedAndNoiseMustBeKnown) {
                       "sampling": {"method": "sequential"})"),
             "job.json: $.quality: expected no adaptiveThreshold, as the rounds of sequential go on "
             "from each other where it carries samples, got 0.01");
-  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 8, "adaptiveThreshold": 0.01},
-                      "image": {"tileSize": 20})"),
-            "job.json: $.quality: expected no adaptiveThreshold, as image.tileSize, 20, is no "
-            "multiple of 8, got 0.01");
   EXPECT_EQ(quality_faults(R"("quality": {"rounds": 16, "maxRounds": 8})"),
             "job.json: $.quality.maxRounds: expected 0, or at least quality.rounds, 16, got 8");
   EXPECT_EQ(quality_faults(R"("quality": {"sweeps": 2}, "sampling": {"method": "auto"})"),

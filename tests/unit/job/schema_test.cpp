@@ -233,7 +233,7 @@ int expect_defaults(const json& schema, const json& value, const std::string& pa
 }
 
 TEST(Schema, ShowsTheDefaultsOfTheSpecification) {
-  EXPECT_GE(expect_defaults(read_schema(), json::parse(to_json(JobSpec{})), ""), 40);
+  EXPECT_GE(expect_defaults(read_schema(), json::parse(to_json(preset_job())), ""), 40);
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ TEST(GltfExtensions, RequiredOnesThatOnlyAddAreSaid) {
               ",\"extensionsUsed\":[\"" + name + "\"],\"extensionsRequired\":[\"" + name + "\"]"));
     const JobSpec job = test::settled(test::job_of(file, "", kCamera));
     EXPECT_EQ(job.scene.objects.size(), 1u) << name;
-    EXPECT_THAT(scene_warnings(job.scene), Contains(HasSubstr(name + " is not read")));
+    EXPECT_THAT(scene_warnings(job), Contains(HasSubstr(name + " is not read")));
   }
 }
 

@@ -41,7 +41,7 @@ struct Loaded {
     if (!loaded) return;
     scene = *loaded;
     said = geometry_warnings(job, scene);
-    for (const auto& lines : {scene_warnings(job.scene), left_out})
+    for (const auto& lines : {scene_warnings(job), left_out})
       said.insert(said.end(), lines.begin(), lines.end());
   }
 
@@ -419,7 +419,7 @@ struct Keyed {
     for (const FrameNumber frame : settled->frames)
       x.push_back(
           object_motion_at(settled->scene.objects.at(0), KeyCurve::linear, frame.value()).offset.x);
-    said = scene_warnings(settled->scene);
+    said = scene_warnings(*settled);
     said.insert(said.end(), left_out.begin(), left_out.end());
   }
   std::vector<float> x;

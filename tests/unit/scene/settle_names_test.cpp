@@ -127,26 +127,29 @@ TEST(SceneWarnings, SayWhatIsNotReadOfWhatIsShown) {
       "KHR_lights_punctual"])";
   const std::string file = set_of(R"({"name":"a","mesh":0})", glows + R"(,{"name":"grey"})", more);
   const auto said = [&](const std::string& scene) {
-    return scene_warnings(settled(job_of(file, scene, kCamera)).scene);
+    return scene_warnings(settled(job_of(file, scene, kCamera)));
   };
   const auto extension = HasSubstr("names.glb: extension KHR_lights_punctual is not read");
-  EXPECT_THAT(said(""), ElementsAre("material \"lamp\": it glows, but lights nothing", extension,
-                                    HasSubstr("material \"lamp\": its occlusion texture is not")));
+  EXPECT_THAT(said(""),
+              ElementsAre("material \"lamp\": it glows, but lights nothing, as light.bounces is 0",
+                          extension, HasSubstr("material \"lamp\": its occlusion texture is not")));
   // Not of what is hidden, or what the job has in its place; of the job's own, too.
   EXPECT_THAT(said(R"(, "nodes": {"a": {"material": "grey"}}})"), ElementsAre(extension));
   EXPECT_THAT(said(R"( , "materials": {"lamp": {"type": "diffuse"}})"), ElementsAre(extension));
   EXPECT_THAT(said(R"( , "materials": {"lamp": {"type": "diffuse", "emission": [0, 1, 0]}})"),
-              ElementsAre("material \"lamp\": it glows, but lights nothing", extension));
-  EXPECT_THAT(said(R"( , "materials": {"own": {"type": "diffuse", "emission": [0, 1, 0]}},
+              ElementsAre("material \"lamp\": it glows, but lights nothing, as light.bounces is 0",
+                          extension));
+  EXPECT_THAT(
+      said(R"( , "materials": {"own": {"type": "diffuse", "emission": [0, 1, 0]}},
                        "ground": {"material": "own"})"),
-              testing::Contains("material \"own\": it glows, but lights nothing"));
+      testing::Contains("material \"own\": it glows, but lights nothing, as light.bounces is 0"));
 }
 
 TEST(SceneWarnings, SayWhatStandsForNoMaterialOfTheFile) {
   const std::string file = set_of(R"({"mesh":0})", R"({"name":"clay"},{"name":"spare"})");
   const auto said = [&](const std::string& materials, const std::string& more = "") {
     return scene_warnings(
-        settled(job_of(file, R"( , "materials": {)" + materials + "}" + more, kCamera)).scene);
+        settled(job_of(file, R"( , "materials": {)" + materials + "}" + more, kCamera)));
   };
   const std::string diffuse = R"({"type": "diffuse"})";
   EXPECT_THAT(said("\"claay\": " + diffuse),

@@ -148,7 +148,7 @@ TEST(SettleScene, ReadsCoats) {
   ASSERT_TRUE(paint.clearcoat_normal_texture);
   EXPECT_TRUE(paint.clearcoat_normal_texture->file.ends_with("b.png"));
   EXPECT_EQ(paint.clearcoat_normal_texture->strength, 0.5f);
-  EXPECT_THAT(scene_warnings(job.scene), testing::IsEmpty());
+  EXPECT_THAT(scene_warnings(job), testing::IsEmpty());
 }
 
 /// Node "spun" turns (animation 1), its parent "cart" goes along x (animation 2), "hop" jumps by

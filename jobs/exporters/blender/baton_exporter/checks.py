@@ -64,7 +64,10 @@ def check_view(scene, add):
 def check_cycles(scene, add):
     cycles = scene.cycles
     if scene.render.engine != "CYCLES":
-        add(f"what only {scene.render.engine} shows", "judge by Cycles, whose direct light Baton renders")
+        add(f"what only {scene.render.engine} shows", "judge by Cycles")
+    fewest, most = sorted(min(n, cycles.max_bounces) for n in (cycles.diffuse_bounces, cycles.glossy_bounces))
+    if fewest < most:
+        add(f"{fewest} bounces of one kind of light: {most} of all are taken", "set those of diffuse and glossy light to the same")
     if cycles.pixel_filter_type == "BOX":
         return
     if abs(cycles.filter_width - 1.5) > 1e-3:

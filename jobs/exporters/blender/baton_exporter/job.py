@@ -16,7 +16,7 @@ from .report import Report
 from .world import World
 
 FILTERS = {"BOX": "box", "GAUSSIAN": "gaussian", "BLACKMAN_HARRIS": "blackman-harris"}
-SITES = 4
+SITES, MOST_BOUNCES = 4, 64
 
 
 class CannotExport(Exception):
@@ -62,6 +62,8 @@ def export(folder, strict=False, frames=None):
     job["environment"] = world.job(folder, numbers)
     if "keys" in job["camera"]:
         job["motion"] = {"curve": "linear"}
+    if scene.render.engine == "CYCLES":
+        job["light"] = light_of(scene.cycles)
     job["output"] = output
     if not (strict and report.entries):
         try:
@@ -115,6 +117,12 @@ def image_of(scene):
     if kind != "box":
         image["filter"] = kind
     return image
+
+
+def light_of(cycles):
+    """As many surfaces as the kind of light that meets most of them; check_cycles reports what has fewer."""
+    most = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces), MOST_BOUNCES)
+    return {"bounces": most, "filterGlossy": cycles.blur_glossy > 0}
 
 
 def output_of(scene, fps):

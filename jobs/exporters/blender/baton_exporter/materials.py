@@ -104,7 +104,7 @@ class Surface:
             self.add("Emission Strength of the Principled BSDF is connected", "set it to one value")
         glows = nodes.source(strength) or strength.default_value != 0
         if glows and (nodes.source(color) or max(color.default_value[:3]) > 0):
-            self.add("it glows, which the camera sees, but lights nothing", "put lights into the world's image")
+            self.add("it glows: what finds it by chance is lit by it", "put lights into the world's image")
             self.check_input(color, {"MIX"})
 
     def check_input(self, socket, helpers):
