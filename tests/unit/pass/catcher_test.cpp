@@ -261,6 +261,14 @@ TEST(Catcher, ObjectsHaveTheSameBytesWithLightBetweenSurfaces) {
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
     EXPECT_EQ(render_tiled(job, 8, 2, test::keeping_nothing()), whole);
   }
+  JobSpec job = lit_by_objects(2);
+  job.scene.materials["metal"] = job.scene.materials["glossy"];
+  // The camera sees the sides with which they face each other.
+  job.scene.objects[0].rotate_deg = {0, -40, 0};
+  job.scene.objects[1].rotate_deg = {0, 40, 0};
+  JobSpec without = job;
+  without.scene.ground.reset();
+  expect_same(job, without);
 }
 
 }  // namespace
