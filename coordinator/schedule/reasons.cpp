@@ -309,6 +309,11 @@ std::optional<TaskIndex> Reasons::explain_ready(const Digest& digest, const Sche
     explain_free(digest, job, task, *free, chain);
     return std::nullopt;
   }
+  // Where others hold the store, a thread that comes free does not help.
+  if (auto lack = lack_of_room(digest, job, task); lack && !lack->jobs.empty()) {
+    tell_lack(*std::move(lack), chain);
+    return std::nullopt;
+  }
   std::vector<std::string> busy = readers;
   std::erase_if(busy, has_none);
   if (busy.empty()) {
@@ -344,54 +349,63 @@ void Reasons::explain_free(const Digest& digest, const Scheduler::Job& job, Task
                      .awaited = graph.key(*chosen)});
     task = *chosen;
   }
-  // What jobs that come first wait for, and who waits for the most.
-  Room before = Room::enough;
-  std::optional<Digest> waiting;
-  for (const Digest& first : scheduler_.in_turn()) {
-    if (first == digest) break;
-    const Scheduler::Job& other = *scheduler_.find_job(first);
-    if (other.tasks.book().ready().empty()) continue;
-    const Room lack = RoomOfTasks(scheduler_, other, before).most();
-    if (lack <= before) continue;
-    before = lack;
-    waiting = first;
-  }
-  Cause cause{.kind = ReasonKind::asking, .job = digest, .task = graph.key(task)};
-  if (scheduler_.room_for(job, task, before) == Room::enough) {
-    cause.workers = {worker};
+  if (auto cause = lack_of_room(digest, job, task)) {
+    tell_lack(*std::move(cause), chain);
   } else {
-    explain_room(digest, job, task, waiting, cause);
+    chain.push_back(
+        {.kind = ReasonKind::asking, .job = digest, .task = graph.key(task), .workers = {worker}});
   }
+}
+
+const Reasons::Before& Reasons::before(const Digest& job) const {
+  if (before_.empty()) {
+    Before so_far;
+    for (const Digest& next : scheduler_.in_turn()) {
+      before_[next] = so_far;
+      const Scheduler::Job& other = *scheduler_.find_job(next);
+      if (other.tasks.book().ready().empty()) continue;
+      const Room lack = RoomOfTasks(scheduler_, other, so_far.lack).most();
+      if (lack > so_far.lack) so_far = {lack, next};
+    }
+  }
+  return before_[job];
+}
+
+/// Why the store has no room for the task; nullopt: it has.
+std::optional<Cause> Reasons::lack_of_room(const Digest& digest, const Scheduler::Job& job,
+                                           TaskIndex task) const {
+  if (scheduler_.room().limit == 0) return std::nullopt;
+  const Before& first = before(digest);
+  if (scheduler_.room_for(job, task, first.lack) == Room::enough) return std::nullopt;
+  const StoreRoom room = scheduler_.room();
+  const std::uint64_t taken = room.used + room.expected;
+  Cause cause{.kind = ReasonKind::store, .job = digest, .task = job.tasks.graph().key(task)};
+  cause.need_bytes = needed_bytes(job.in_store(), task);
+  cause.free_bytes = room.limit > taken ? room.limit - taken : 0;
+  cause.ended_bytes = scheduler_.kept_bytes();
+  cause.room = scheduler_.room_for(job, task, Room::enough);
+  if (cause.room == Room::enough) {
+    cause.jobs = {first.waiting.value()};  // which alone keeps it
+    return cause;
+  }
+  for (const Digest& other : scheduler_.jobs()) {
+    const Scheduler::Job& holder = *scheduler_.find_job(other);
+    if (other != digest && holder.begun_runs > Run(0) && is_open(holder.status))
+      cause.jobs.push_back(other);
+  }
+  return cause;
+}
+
+/// One that a person holds back holds its room, too.
+void Reasons::tell_lack(Cause cause, Chain& chain) const {
   const std::vector<Digest> holders = cause.jobs;
   chain.push_back(std::move(cause));
-  // One that a person holds back holds its room, too.
   for (const Digest& holder : holders) {
     const Scheduler::Job& other = *scheduler_.find_job(holder);
     if (other.status != JobStatus::paused) continue;
     chain.push_back(*end_of(holder, other));
     chain.back().jobs = {holder};
     return;
-  }
-}
-
-/// Why the store has no room for the task. waiting: a job that comes first and waits for room.
-void Reasons::explain_room(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
-                           const std::optional<Digest>& waiting, Cause& cause) const {
-  const StoreRoom room = scheduler_.room();
-  const std::uint64_t taken = room.used + room.expected;
-  cause.kind = ReasonKind::store;
-  cause.need_bytes = needed_bytes(job.in_store(), task);
-  cause.free_bytes = room.limit > taken ? room.limit - taken : 0;
-  cause.ended_bytes = scheduler_.kept_bytes();
-  cause.room = scheduler_.room_for(job, task, Room::enough);
-  if (cause.room == Room::enough) {
-    cause.jobs = {waiting.value()};  // which alone keeps it
-    return;
-  }
-  for (const Digest& other : scheduler_.jobs()) {
-    const Scheduler::Job& holder = *scheduler_.find_job(other);
-    if (other != digest && holder.begun_runs > Run(0) && is_open(holder.status))
-      cause.jobs.push_back(other);
   }
 }
 

@@ -74,8 +74,9 @@ class Reasons {
   std::optional<TaskIndex> chosen_for(const std::string& worker, const Scheduler::Job& job) const;
   void explain_free(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
                     const std::string& worker, Chain& chain) const;
-  void explain_room(const Digest& digest, const Scheduler::Job& job, TaskIndex task,
-                    const std::optional<Digest>& waiting, Cause& cause) const;
+  std::optional<Cause> lack_of_room(const Digest& digest, const Scheduler::Job& job,
+                                    TaskIndex task) const;
+  void tell_lack(Cause cause, Chain& chain) const;
   void explain_busy(const Digest& digest, const TaskKey& task,
                     const std::vector<std::string>& workers, Chain& chain) const;
   Cause silence_of(const std::vector<std::string>& workers) const;
@@ -83,9 +84,18 @@ class Reasons {
   std::optional<Cause> refusal(const std::string& worker, const Digest& digest,
                                const Scheduler::Job& job) const;
 
+  /// What jobs that come before one wait for, and who of them waits for the most.
+  struct Before {
+    Room lack = Room::enough;
+    std::optional<Digest> waiting = {};
+  };
+  const Before& before(const Digest& job) const;
+
   const Scheduler& scheduler_;
   TimePoint now_;
   Conduct conduct_;
+  /// Of all jobs that run, once somebody has asked.
+  mutable std::map<Digest, Before> before_;
 };
 
 }  // namespace baton

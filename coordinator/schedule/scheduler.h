@@ -59,6 +59,7 @@ class Scheduler {
     /// Tasks of each kind, after one found no space and until one is done; 0: they do not.
     std::array<TimePoint, 3> rests_until = {};
     std::string waits = {};     ///< for what, as far as an event said so
+    bool is_hopeless = false;   ///< it failed as the store is too small for it
     std::string renderer = {};  ///< of what is done; empty: not known
     bool is_mixed = false;      ///< others have made some of it, too
     /// Since then nobody renders so, and others would take over.
@@ -176,6 +177,12 @@ class Scheduler {
   void serve(TimePoint now, Actions& actions);
   void ask_for_states(const std::string& worker, TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
+
+  // Room (scheduler_room.cpp).
+  bool could_go_on_alone(const Job& job) const;
+  void make_room(Actions& actions);
+  void begin_again(const Digest& digest, Actions& actions);
+  void fail_hopeless(const Digest& digest, Actions& actions);
 
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);

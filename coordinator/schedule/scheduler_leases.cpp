@@ -61,6 +61,8 @@ void Scheduler::on(const ClockTicked&, TimePoint now, Actions& actions) {
     actions.push_back(ForgetWorker{id});
   }
 
+  make_room(actions);
+
   // Workers end what takes too long themselves. Who does not, alive as it is, fails the task here.
   // A lease may wait on its worker for as long as the task before it may take.
   constexpr std::chrono::seconds kSlack{limits::kMaxSecondsToLoad + 60};

@@ -110,6 +110,8 @@ bool can_all_end(const StoreRoom& room, const JobInStore& job, std::span<const J
 
 }  // namespace
 
+std::uint64_t bytes_alone(const JobInStore& job) { return claim_of(job).whole(); }
+
 std::uint64_t unmade_bytes(const JobInStore& job, Run end) {
   const JobGraph& graph = job.graph;
   std::uint64_t bytes = 0;

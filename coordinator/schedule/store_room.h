@@ -48,6 +48,9 @@ std::uint64_t unmade_bytes(const JobInStore& job, Run end);
 /// What the store must take so that the frames of a task can be written, or the task.
 std::uint64_t needed_bytes(const JobInStore& job, TaskIndex task);
 
+/// What the store must take at once so that the job can end where there is no other, about.
+std::uint64_t bytes_alone(const JobInStore& job);
+
 /// Whether a task may be granted; if not, what it waits for, least first.
 enum class Room : std::uint8_t {
   enough,

@@ -72,6 +72,11 @@ EtaBook::Found EtaBook::find(const Scheduler& scheduler, const Slots& slots, Tim
   for (const Digest& version : scheduler.in_turn()) {
     const Scheduler::Job& job = *scheduler.find_job(version);
     if (!job.waits.empty() || scheduler.lacks_renderer(version)) continue;
+    // One that is not begun before others have ended is in nobody's way.
+    const std::set<TaskIndex>& ready = job.tasks.book().ready();
+    if (job.begun_runs == Run(0) && !ready.empty() &&
+        scheduler.room_for(job, *ready.begin(), Room::enough) == Room::beside)
+      continue;
     const auto times = times_.find(version);
     versions.push_back(version);
     jobs.push_back(

@@ -123,12 +123,16 @@ Status FarmCore::check_own(const Speaker& speaker, const Digest& job) const {
                   owner.empty() ? "nobody" : fmt::format("'{}'", owner), speaker.name)};
 }
 
-/// What versions that have made way for others keep.
+/// What versions keep that have made way for others, and jobs for which the store was too small.
 Status FarmCore::let_superseded_go() {
-  for (const Digest& version : history.jobs().superseded()) {
+  std::vector<Digest> versions = history.jobs().superseded();
+  for (const Digest& job : std::exchange(hopeless_, {})) {
+    if (scheduler.find_job(job) == nullptr) versions.push_back(job);
+  }
+  for (const Digest& version : versions) {
     BATON_ASSIGN(const std::vector<Digest> kept, journal.kept_blobs(version));
     if (kept.empty()) continue;
-    spdlog::info("job {}: {} blobs that an earlier version left go, as the store has no room",
+    spdlog::info("job {}: {} blobs that it has left go, as the store has no room",
                  history.name_of(version), kept.size());
     for (const Digest& blob : kept) BATON_TRY(journal.let_go(version, blob));
     garbage.add(kept);
@@ -192,6 +196,7 @@ Status FarmCore::archive_job(const Digest& digest, const std::set<FrameIndex>& s
   const Scheduler::Job* const job = scheduler.find_job(digest);
   if (job == nullptr || is_open(job->status)) return {};
   superseded_keep_ = true;
+  if (job->is_hopeless) hopeless_.insert(digest);
   std::vector<BlobRef> kept;
   for (TaskIndex task = job->tasks.graph().num_frames(); task < job->tasks.graph().num_tasks();
        ++task) {

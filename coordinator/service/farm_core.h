@@ -129,7 +129,8 @@ class FarmCore {
   /// stand: frames that count as done, as before they were to be made once more.
   Status archive_job(const Digest& job, const std::set<FrameIndex>& stand = {});
   /// Tells the scheduler what ended jobs leave in the store. Where an open job has no room, what
-  /// earlier versions of jobs left goes before: nobody can ask for it by name.
+  /// earlier versions of jobs left goes before: nobody can ask for it by name; and what those left
+  /// for which the store was too small.
   Status count_kept();
   /// Describes a job that the scheduler has.
   Result<JobDetail> living_detail(const Digest& job);
@@ -177,6 +178,7 @@ class FarmCore {
   /// That the archive keeps, as the scheduler was told.
   std::uint64_t kept_bytes_ = 0;
   bool superseded_keep_ = true;  ///< versions that are not the newest may
+  std::set<Digest> hopeless_;    ///< ended jobs for which the store was too small
 };
 
 }  // namespace baton

@@ -309,6 +309,11 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
       farm_.history.jobs().priority(farm_.history.jobs().of(digest).id, document.job.priority);
   BATON_ASSIGN(const std::optional<std::string> known, farm_.journal.document(digest));
   BATON_TRY(take_over(heritage, known ? "" : message.json, event));
+  if (carries_state(event.spec) && !event.plan.leading_runs.empty())
+    reasons.push_back(
+        fmt::format("runs that were begun stay as they are; state.checkpointEvery, {}, holds for "
+                    "those after them",
+                    event.spec.state.checkpoint_every));
   LostFiles lost = find_lost_files(event, farm_.store, files_, locked);
   const bool is_right = event.lost.empty() && lost.all_frames_right();
   for (std::string& reason : lost_reasons(lost)) {

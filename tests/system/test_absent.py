@@ -63,7 +63,7 @@ def what_has_failed_is_told_after_the_end(programs, folder):
         check_equal(farm.show(shot)["status"], "failed", "the job")
         failed = ask(farm, "job", "tasks", shot, "--failed")
         check(failed and all(t["worker"] == "a" and t["status"] == "failed" and meshes[0].name in t["message"] for t in failed), f"failed tasks: {failed}")
-        check_says(farm.baton("job", "tasks", shot).stdout, "failed", "attempt 1", meshes[0].name)
+        check_says(farm.baton("job", "tasks", shot).stdout, "failed", "attempts failed so, this is the last", meshes[0].name)
         farm.coordinator.kill()
         farm.start_coordinator()
         check_equal(ask(farm, "job", "tasks", shot, "--failed"), failed, "failed tasks after a restart")

@@ -232,6 +232,22 @@ TEST(Reasons, APausedJobThatHoldsRoomIsTheLastCause) {
   EXPECT_THAT(chain[2].jobs, ElementsAre(farm.job)) << "which is not the one that waits";
 }
 
+// A thread that comes free would not help it.
+TEST(Reasons, WhoWaitsForTheStoreIsNotToldThatAllAreBusy) {
+  ReasonsFarm farm(small_job(2, 4, 2), 1000);
+  farm.step(WorkerJoined{"a", {}});
+  farm.finish(farm.ask_one("a"));
+  farm.ask_one("a");
+  const Digest other = digest_of("other");
+  JobSpec first = small_job(6, 4, 2);
+  first.priority = 99;
+  farm.step(JobAdded{other, first, JobStatus::running, {}, {}});
+  const std::vector<Cause> chain = Reasons(farm.scheduler, farm.now).of_job(other);
+  ASSERT_THAT(kinds(chain), ElementsAre(ReasonKind::input, ReasonKind::store));
+  EXPECT_EQ(chain[1].room, Room::beside);
+  EXPECT_THAT(chain[1].jobs, ElementsAre(farm.job));
+}
+
 TEST(Reasons, FramesFarAheadComeLater) {
   JobSpec spec = small_job(1, 4000, 1, /*carry=*/false);
   spec.image = {.width = 4096, .height = 4096, .sites = 1, .tile_size = 4096};

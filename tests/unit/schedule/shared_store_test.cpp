@@ -9,8 +9,8 @@
 #include "tests/unit/schedule/farm.h"
 
 /// Several jobs in one store with a limit. Whatever is begun, paused, requeued or put first, a farm
-/// whose workers are idle has nothing to do: each job fits alone, so all of them end. Jobs that are
-/// done are deleted.
+/// whose workers are idle has nothing to do: each job that fits alone ends as done, the others as
+/// failed. Jobs that have ended are deleted.
 namespace baton {
 namespace {
 
@@ -53,11 +53,13 @@ std::uint64_t fullest(const JobSpec& spec, bool is_requeued) {
 
 class SharedStore {
  public:
-  /// spread: sizes of blobs are up to so much larger or smaller, as a share.
-  SharedStore(std::uint32_t seed, double spread, bool requeues)
+  /// spread: sizes of blobs are up to so much larger or smaller, as a share. room: the limit, as a
+  /// share of one in which each job fits.
+  SharedStore(std::uint32_t seed, double spread, bool requeues, double room = 1)
       : random_(seed),
         spread_(spread),
         requeues_(requeues),
+        room_(room),
         scheduler_({1, kSilence, any_limit(), false}) {
     for (int i = 0; i <= roll(4); ++i)
       scheduler_.step(WorkerJoined{workers_.emplace_back(1, static_cast<char>('a' + i)), {}}, now_);
@@ -93,12 +95,16 @@ class SharedStore {
     while (num_submitted_ < specs_.size()) submit();
     for (const auto& [job, spec] : std::map(jobs_)) step(JobResumed{job});
   }
-  /// Nothing happens any more but work. Returns whether all jobs were done, and are deleted.
+  /// Nothing happens any more but work. Returns whether all jobs have ended, and are deleted.
   bool work_off() {
-    while (true) {
-      for (const std::string& worker : workers_) step(WorkRequested{worker, 1 + roll(2)});
-      if (held_.empty()) break;
-      finish_any();
+    for (int idle = 0; idle < 2; ++idle) {
+      do {
+        for (const std::string& worker : workers_) step(WorkRequested{worker, 1 + roll(2)});
+        if (!held_.empty()) idle = 0;
+        if (!held_.empty()) finish_any();
+      } while (!held_.empty());
+      if (const std::size_t num_left = jobs_.size(); step(ClockTicked{}), num_left > jobs_.size())
+        idle = 0;
     }
     return jobs_.empty();
   }
@@ -136,6 +142,8 @@ class SharedStore {
   std::uint64_t limit() const { return scheduler_.room().limit; }
   std::size_t num_requeued() const { return num_requeued_; }
   std::size_t num_beside() const { return num_beside_; }
+  std::size_t num_failed() const { return num_failed_; }
+  std::size_t num_jobs() const { return specs_.size(); }
 
  private:
   int roll(int sides) { return static_cast<int>(random_() % static_cast<unsigned>(sides)); }
@@ -145,7 +153,7 @@ class SharedStore {
     double most = 0;
     for (const JobSpec& spec : specs_)
       most = std::max(most, static_cast<double>(fullest(spec, requeues_)));
-    return static_cast<std::uint64_t>(most * (1 + spread_) *
+    return static_cast<std::uint64_t>(room_ * most * (1 + spread_) *
                                       (1 + 0.1 * roll(10) + (requeues_ ? 0.5 : 0)));
   }
   template <class F>
@@ -200,8 +208,15 @@ class SharedStore {
         std::erase_if(held_, [&](const GrantLease& held) { return held.lease == end->lease; });
     }
     std::erase_if(jobs_, [&](const auto& job) {
-      if (scheduler_.find_job(job.first)->status != JobStatus::done) return false;
+      const Scheduler::Job& known = *scheduler_.find_job(job.first);
+      if (is_open(known.status)) return false;
       done.push_back(job.first);
+      if (known.status == JobStatus::done) return true;
+      ++num_failed_;
+      EXPECT_TRUE(known.is_hopeless);
+      EXPECT_GT(static_cast<double>(fullest(job.second, requeues_)) * (1 + spread_),
+                static_cast<double>(limit()));
+      std::erase_if(held_, [&](const GrantLease& held) { return held.lease.job == job.first; });
       return true;
     });
     most_bytes_ = std::max(most_bytes_, scheduler_.store_bytes());
@@ -216,10 +231,11 @@ class SharedStore {
   std::mt19937 random_;
   double spread_;
   bool requeues_;
+  double room_;
   std::vector<JobSpec> specs_;
   Scheduler scheduler_;
   std::vector<std::string> workers_;
-  std::size_t num_submitted_ = 0, num_requeued_ = 0, num_beside_ = 0;
+  std::size_t num_submitted_ = 0, num_requeued_ = 0, num_beside_ = 0, num_failed_ = 0;
   std::map<Digest, JobSpec> jobs_;
   std::vector<GrantLease> held_;
   std::uint64_t most_bytes_ = 0;
@@ -234,6 +250,7 @@ TEST(SharedStore, JobsOfWhichEachFitsAloneAllEnd) {
     for (int steps = 0; steps < 1500; ++steps) farm.advance();
     farm.resume_all();
     ASSERT_TRUE(farm.work_off()) << "the farm stands still: " << farm.why();
+    EXPECT_EQ(farm.num_failed(), 0u);
     EXPECT_LE(farm.most_bytes(), farm.limit() + farm.limit() / (seed % 2 == 0 ? 4 : 8));
     num_felt += farm.most_bytes() * 4 > farm.limit() * 3 ? 1 : 0;
     num_requeued += farm.num_requeued();
@@ -242,6 +259,22 @@ TEST(SharedStore, JobsOfWhichEachFitsAloneAllEnd) {
   EXPECT_GT(num_felt, num_seeds() / 16) << "stores that were nearly full";
   EXPECT_GT(num_requeued, num_seeds()) << "frames that were rendered once more";
   EXPECT_GT(num_beside, num_seeds() / 4) << "farms with several jobs that were begun";
+}
+
+// Jobs for which the store is too small fail, and keep none of the others.
+TEST(SharedStore, WhatDoesNotFitAloneFailsAndAllOthersEnd) {
+  std::size_t num_failed = 0, num_mixed = 0;
+  for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    SharedStore farm(seed, seed % 2 == 0 ? 0.2 : 0.0, seed % 4 < 2, 0.1 + 0.1 * (seed % 7));
+    for (int steps = 0; steps < 1500; ++steps) farm.advance();
+    farm.resume_all();
+    ASSERT_TRUE(farm.work_off()) << "the farm stands still: " << farm.why();
+    num_failed += farm.num_failed() > 0 ? 1 : 0;
+    num_mixed += farm.num_failed() > 0 && farm.num_failed() < farm.num_jobs() ? 1 : 0;
+  }
+  EXPECT_GT(num_failed, num_seeds() / 4);
+  EXPECT_GT(num_mixed, num_seeds() / 8) << "farms in which some failed and some were done";
 }
 
 }  // namespace
