@@ -222,6 +222,14 @@ struct FrameReport {
   bool operator==(const FrameReport&) const = default;
 };
 
+/// Luminance of what pixels show of surfaces, where there is light between these: sums over pixels
+/// and rounds.
+struct LightSums {
+  double direct = 0, indirect = 0;  ///< the second by way of other surfaces
+
+  bool operator==(const LightSums&) const = default;
+};
+
 /// Counters that workers add up and `baton job show` prints; merging is addition.
 struct RenderStats {
   std::uint64_t pixels = 0, rays_primary = 0, rays_shadow = 0, target_evaluations = 0;
@@ -238,6 +246,7 @@ struct RenderStats {
   std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
   double seconds_second_pass = 0;      ///< all of the second pass
   double seconds_second_rays = 0;      ///< occlusion rays of the second pass
+  LightSums light;
 
   bool operator==(const RenderStats&) const = default;
   void merge(const RenderStats& b);

@@ -22,7 +22,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 20;
+inline constexpr std::uint16_t kProtocolVersion = 21;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 /// The first message, sent again after a reconnect or a new epoch.

@@ -5,7 +5,7 @@
 namespace baton {
 
 /// Stands in `PRAGMA user_version`.
-inline constexpr std::int64_t kSchemaVersion = 8;
+inline constexpr std::int64_t kSchemaVersion = 9;
 inline constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell

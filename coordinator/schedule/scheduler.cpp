@@ -39,10 +39,10 @@ const Scheduler::Job* Scheduler::find_job(const Digest& job) const {
   return found == jobs_.end() ? nullptr : &found->second;
 }
 
-bool Scheduler::is_made_again(const Digest& blob) const {
-  return std::ranges::any_of(leases_.all(), [&](const auto& lease) {
+bool is_made_again(const Scheduler& scheduler, const Digest& blob) {
+  return std::ranges::any_of(scheduler.leases().all(), [&](const auto& lease) {
     const auto& [job, task] = lease.first;
-    const Job* const known = find_job(job);
+    const Scheduler::Job* const known = scheduler.find_job(job);
     if (known == nullptr) return false;
     const std::vector<BlobRef>& former = known->tasks.made().former_outputs(task);
     return std::ranges::find(former, blob, &BlobRef::digest) != former.end();

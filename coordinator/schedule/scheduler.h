@@ -59,7 +59,7 @@ class Scheduler {
     /// Tasks of each kind, after one found no space and until one is done; 0: they do not.
     std::array<TimePoint, 3> rests_until = {};
     std::string waits = {};     ///< for what, as far as an event said so
-    bool is_hopeless = false;   ///< it failed as the store is too small for it
+    bool is_hopeless = false;   ///< the store was too small for it
     std::string renderer = {};  ///< of what is done; empty: not known
     bool is_mixed = false;      ///< others have made some of it, too
     /// Since then nobody renders so, and others would take over.
@@ -123,8 +123,6 @@ class Scheduler {
   /// Who is connected and has which lease.
   const LeaseBook& leases() const { return leases_; }
   bool is_referenced(const Digest& blob) const { return blobs_.contains(blob); }
-  /// Whether a task in work made this blob before: it may be put again at any moment.
-  bool is_made_again(const Digest& blob) const;
 
  private:
   /// A task that a worker holds.
@@ -178,11 +176,7 @@ class Scheduler {
   void ask_for_states(const std::string& worker, TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
 
-  // Room (scheduler_room.cpp).
-  bool could_go_on_alone(const Job& job) const;
-  void make_room(Actions& actions);
-  void begin_again(const Digest& digest, Actions& actions);
-  void fail_hopeless(const Digest& digest, Actions& actions);
+  void make_room(Actions& actions);  // scheduler_room.cpp
 
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);
@@ -243,5 +237,8 @@ class RoomOfTasks {
   std::map<std::pair<TaskKind, std::int32_t>, Room> known_;
   Room lack_ = Room::enough;
 };
+
+/// Whether a task in work made this blob before: it may be put again at any moment.
+bool is_made_again(const Scheduler& scheduler, const Digest& blob);
 
 }  // namespace baton

@@ -1,12 +1,41 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <functional>
 
 #include "common/base/size_text.h"
 #include "coordinator/schedule/scheduler.h"
 
 namespace baton {
+namespace {
+
+/// Whether one of the job's ready tasks could be granted in a store that holds nothing else.
+bool could_go_on_alone(const Scheduler::Job& job, std::uint64_t store_limit) {
+  const JobTasks& tasks = job.tasks;
+  std::uint64_t own = 0;
+  for (TaskIndex task = 0; task < tasks.graph().num_tasks(); ++task) {
+    for (const auto& blobs : {tasks.ledger().live_blobs(tasks.view(), task),
+                              tasks.ledger().spare_blobs(tasks.view(), task)}) {
+      for (const BlobRef& blob : blobs)
+        own += blob.kind == BlobKind::image || blob.is_held() ? 0 : blob.size_bytes;
+    }
+  }
+  const StoreRoom alone{.limit = store_limit, .used = own};
+  return std::ranges::any_of(tasks.book().ready(), [&](TaskIndex task) {
+    return room_for(alone, job.in_store(), {}, task, Room::enough) == Room::enough;
+  });
+}
+
+std::string hopeless_text(const Scheduler::Job& job, std::uint64_t store_limit) {
+  const JobInStore in_store = job.in_store();
+  const std::uint64_t needed =
+      std::max(bytes_alone(in_store), needed_bytes(in_store, *job.tasks.book().ready().begin()));
+  return fmt::format(
+      "the store is too small for it: it needs about {} at once, and --store-limit allows {}: "
+      "raise the limit, and submit it again",
+      bytes_text(needed), bytes_text(store_limit));
+}
+
+}  // namespace
 
 void Scheduler::on(const StoreKeeps& event, TimePoint, Actions&) { kept_bytes_ = event.size_bytes; }
 
@@ -41,24 +70,6 @@ Room Scheduler::room_for(const Job& job, TaskIndex task, Room before) const {
   return baton::room_for(room(), job.in_store(), others, task, before);
 }
 
-/// Whether one of the job's ready tasks could be granted in a store that holds nothing else.
-bool Scheduler::could_go_on_alone(const Job& job) const {
-  const JobTasks& tasks = job.tasks;
-  std::uint64_t own = 0;
-  for (TaskIndex task = 0; task < tasks.graph().num_tasks(); ++task) {
-    for (const auto& blobs : {tasks.ledger().live_blobs(tasks.view(), task),
-                              tasks.ledger().spare_blobs(tasks.view(), task)}) {
-      for (const BlobRef& blob : blobs)
-        own += blob.kind == BlobKind::image || blob.is_held() ? 0 : blob.size_bytes;
-    }
-  }
-  const StoreRoom alone{.limit = rules_.store_limit, .used = own};
-  const std::set<TaskIndex>& ready = tasks.book().ready();
-  return std::ranges::any_of(ready, [&](TaskIndex task) {
-    return baton::room_for(alone, job.in_store(), {}, task, Room::enough) == Room::enough;
-  });
-}
-
 /// Where nobody finds work, room is made, until somebody does: what stays for workers that may be
 /// lost goes; jobs fail that could not go on if they were alone, or else the last one that could
 /// not end; and where all could, the last one begins again after the others.
@@ -77,44 +88,34 @@ void Scheduler::make_room(Actions& actions) {
   }
   if (store_bytes() < held) return;
 
-  const auto cannot_go_on = [&](const Digest& job) { return !could_go_on_alone(jobs_.at(job)); };
-  const auto end = std::ranges::stable_partition(stuck, std::not_fn(cannot_go_on)).begin();
-  for (const Digest& digest : std::ranges::subrange(end, stuck.end()))
-    fail_hopeless(digest, actions);
+  const auto fail = [&](const Digest& digest) {
+    Job& job = jobs_.at(digest);
+    job.is_hopeless = true;
+    end_job(digest, job, JobStatus::failed, hopeless_text(job, rules_.store_limit), actions);
+  };
+  const auto goes_on = [&](const Digest& digest) {
+    return could_go_on_alone(jobs_.at(digest), rules_.store_limit);
+  };
+  const auto end = std::ranges::stable_partition(stuck, goes_on).begin();
+  std::for_each(end, stuck.end(), fail);
   if (end != stuck.end()) return;
   std::erase_if(stuck, [&](const Digest& job) { return jobs_.at(job).begun_runs == Run(0); });
   if (stuck.size() < 2) return;
   const auto hopeless = std::ranges::find_if(stuck.rbegin(), stuck.rend(), [&](const Digest& job) {
     return bytes_alone(jobs_.at(job).in_store()) > rules_.store_limit;
   });
-  if (hopeless != stuck.rend()) return fail_hopeless(*hopeless, actions);
-  begin_again(stuck.back(), actions);
-}
+  if (hopeless != stuck.rend()) return fail(*hopeless);
 
-/// All that the job has in the store is made once more, after what comes before it.
-void Scheduler::begin_again(const Digest& digest, Actions& actions) {
-  Job& job = jobs_.at(digest);
-  RecordReopened all{digest, {}, "other jobs need its room in the store"};
-  for (TaskIndex task = job.tasks.graph().num_frames(); task < job.tasks.graph().num_tasks();
-       ++task) {
-    if (!job.tasks.ledger().live_blobs(job.tasks.view(), task).empty())
-      all.tasks.push_back(job.tasks.graph().key(task));
+  // All that the last one has in the store is made once more.
+  Job& last = jobs_.at(stuck.back());
+  RecordReopened all{stuck.back(), {}, "other jobs need its room in the store"};
+  const JobGraph& graph = last.tasks.graph();
+  for (TaskIndex task = graph.num_frames(); task < graph.num_tasks(); ++task) {
+    if (!last.tasks.ledger().live_blobs(last.tasks.view(), task).empty())
+      all.tasks.push_back(graph.key(task));
   }
-  reopen(std::move(all), job, actions);
-  job.begun_runs = Run(0);
-}
-
-void Scheduler::fail_hopeless(const Digest& digest, Actions& actions) {
-  Job& job = jobs_.at(digest);
-  const JobInStore in_store = job.in_store();
-  const std::uint64_t needed =
-      std::max(bytes_alone(in_store), needed_bytes(in_store, *job.tasks.book().ready().begin()));
-  job.is_hopeless = true;
-  end_job(digest, job, JobStatus::failed,
-          fmt::format("the store is too small for it: it needs about {} at once, and --store-limit "
-                      "allows {}: raise the limit, and submit it again",
-                      bytes_text(needed), bytes_text(rules_.store_limit)),
-          actions);
+  reopen(std::move(all), last, actions);
+  last.begun_runs = Run(0);
 }
 
 Room RoomOfTasks::operator()(TaskIndex task) {

@@ -74,7 +74,7 @@ Status FarmCore::let_out() {
   }
   return garbage.remove_some(store, [this](const Digest& blob) -> Result<bool> {
     BATON_ASSIGN(const bool is_kept, journal.is_kept(blob));
-    return is_kept || scheduler.is_referenced(blob) || scheduler.is_made_again(blob);
+    return is_kept || scheduler.is_referenced(blob) || is_made_again(scheduler, blob);
   });
 }
 

@@ -178,7 +178,8 @@ class FarmCore {
   /// That the archive keeps, as the scheduler was told.
   std::uint64_t kept_bytes_ = 0;
   bool superseded_keep_ = true;  ///< versions that are not the newest may
-  std::set<Digest> hopeless_;    ///< ended jobs for which the store was too small
+  /// Jobs that have ended since the store was too small for them.
+  std::set<Digest> hopeless_;
 };
 
 }  // namespace baton

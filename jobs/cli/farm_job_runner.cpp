@@ -119,11 +119,11 @@ Status FarmJobRunner::run(const std::vector<JobSpec>& jobs,
       open.erase(open.begin() + static_cast<std::ptrdiff_t>(i));
       ++num_done;
     }
-    count.update();
+    if (!is_quiet_) count.update();
     if (signals_.stop_requested_within(kPause)) return stopped();
     BATON_TRY(farm_->tend());
   }
-  own.finish();
+  if (!is_quiet_) own.finish();
   return {};
 }
 

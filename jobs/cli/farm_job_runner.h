@@ -23,6 +23,8 @@ class FarmJobRunner final : public JobRunner {
   /// Counts all that is run from now on in one line, instead of a line for each call of run().
   void count_as_one(std::string label, std::size_t expected_frames);
   void finish_count();
+  /// Nothing is counted aloud from now on.
+  void be_quiet() { is_quiet_ = true; }
   /// Looks replace whatever is in the places of their frames; other runs do so in any case.
   void restart_looks() { restarts_looks_ = true; }
   void say(const std::string& text) override;
@@ -46,7 +48,7 @@ class FarmJobRunner final : public JobRunner {
   FarmOptions options_;
   std::optional<CoordinatorLink> coordinator_;  ///< none before a local farm is started
   std::optional<RunCount> whole_;
-  bool restarts_looks_ = false;
+  bool restarts_looks_ = false, is_quiet_ = false;
   SignalWait signals_;
   std::optional<LocalFarm> farm_;
   std::optional<RequestClient> client_;

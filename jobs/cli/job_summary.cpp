@@ -153,6 +153,9 @@ std::string job_statistics(const JobSummary& job) {
     text += fmt::format("resampled  {} of the pixels with a surface\n",
                         percent_text(did.pixels_resampled, lit));
   }
+  if (s.light.direct > 0)
+    text += fmt::format("bounces    light between surfaces adds {:.2g} %\n",
+                        100 * s.light.indirect / s.light.direct);
   if (job.state_pixels > 0) {
     text +=
         fmt::format("state      {:.1f} bytes a pixel, {} in all; {:.1f} % of the CPU time\n",
@@ -279,6 +282,8 @@ ordered_json summary_json(const ListedJob& listed) {
                            {"raysShadow", s.rays_shadow},
                            {"targetEvaluations", s.target_evaluations},
                            {"pixelsBackground", s.pixels_background},
+                           {"lightDirect", s.light.direct},
+                           {"lightIndirect", s.light.indirect},
                            {"stateSeconds", s.seconds_state},
                            {"cpuSeconds", s.cpu_seconds}}}};
   add_sampling(s.sampling, result["stats"]);

@@ -16,7 +16,8 @@ struct SurfaceCandidate;
 
 /// What a pixel's paths begin with.
 struct BounceStart {
-  const SiteBlock& sites;            ///< at least one of them sees a surface, or a catcher
+  /// At least one of them sees a surface, or a catcher.
+  const SiteBlock& sites;
   std::span<const SurfaceHit> hits;  ///< (S) what they are made of
   /// Candidates for the light of all surfaces on the way; must outlive the walk.
   const PresampledLight& presampled;

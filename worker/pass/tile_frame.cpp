@@ -264,6 +264,10 @@ void TileFrameRenderer::shade(RoundWork& work, SampleState& state, PixelBatch& b
     pixel.mask = all_free && !known.blocked ? 1.0f : 0.0f;
     pixel.blocked = known.unshadowed ? *known.unshadowed - pixel.radiance : found.blocked;
     pixel.indirect = batch.indirect[i];
+    if (bounces_ && !surfaces.sees_catcher(slot)) {
+      stats_.light.direct += double{luminance(pixel.radiance)};
+      stats_.light.indirect += double{luminance(pixel.indirect)};
+    }
     pixel.radiance += pixel.indirect;
     pixel.shadow += batch.indirect[PixelBatch::kOnEdge + i];
 

@@ -99,7 +99,7 @@ Result<BounceShare> bounce_share(const JobSpec& job) {
         .workers = 1,
         .threads_per_worker = std::max(1, static_cast<int>(std::thread::hardware_concurrency())),
         .work_directory = folder / "work"});
-    runner.count_as_one("light between surfaces", 1);
+    runner.be_quiet();
     BATON_TRY(runner.run({small}, [](std::size_t, const JobSummary&) { return Status(); }));
     BATON_ASSIGN(const FilmTile film, read_exr(frame_path(small, FrameIndex())));
     return share_in(film, material_names(small));

@@ -11,7 +11,8 @@ namespace baton {
 /// luminance, of surfaces that reflect some.
 struct BounceShare {
   double whole = 0;
-  std::string material;  ///< that has most beside its own direct light; empty: none is lit
+  /// That has most beside its own direct light; empty: none is lit.
+  std::string material;
   double of_material = 0;
 };
 /// From a picture of some 2,300 pixels of the middle frame, which a worker of its own renders:

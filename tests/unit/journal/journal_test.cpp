@@ -242,11 +242,11 @@ TEST_F(JournalTest, ACoordinatorOnItsWayOutIsWaitedFor) {
 
 TEST_F(JournalTest, ANewerJournalIsRefused) {
   { open(); }
-  { ASSERT_TRUE(SqlDatabase::open(path).value().execute("PRAGMA user_version = 9").ok()); }
+  { ASSERT_TRUE(SqlDatabase::open(path).value().execute("PRAGMA user_version = 10").ok()); }
   const Result<Journal> journal = Journal::open(path);
   ASSERT_FALSE(journal.ok());
   EXPECT_EQ(journal.error().kind, ErrorKind::version);
-  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 8"));
+  EXPECT_THAT(journal.error().message, HasSubstr("journal version 10, this program reads 9"));
 }
 
 TEST_F(JournalTest, AnotherProgramsDatabaseIsRefused) {

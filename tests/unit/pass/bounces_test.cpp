@@ -71,5 +71,18 @@ TEST(Bounces, ThePictureIsItsParts) {
   EXPECT_GT(added, 0);
 }
 
+// What `render` says that it adds.
+TEST(Bounces, WhatItAddsIsCounted) {
+  const auto render = test::render_tile(bounce_job(Method::pool));
+  double indirect = 0;
+  for (const FilmTile& film : render.films) {
+    for (std::size_t i = 0; i < film.num_pixels(); ++i)
+      indirect += double{luminance({channel(film, "indirect.R")[i], channel(film, "indirect.G")[i],
+                                    channel(film, "indirect.B")[i]})};
+  }
+  EXPECT_GT(render.stats.light.direct, render.stats.light.indirect);
+  EXPECT_NEAR(render.stats.light.indirect, indirect, 1e-4 * indirect);
+}
+
 }  // namespace
 }  // namespace baton

@@ -167,13 +167,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 20);
+  static_assert(kProtocolVersion == 21);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "8e0f849b1a6518426ca57890c0aa72f0");
+  EXPECT_EQ(digest_of(all).hex(), "cece4d61813ac929225286273ee5d331");
 }
 
 // Names are one line, what is told may be several; documents and paths are bytes.
@@ -207,7 +207,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x14\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x15\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -253,7 +253,7 @@ TEST(Messages, AnotherVersionIsAVersionError) {
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 21, this program speaks 20"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 22, this program speaks 21"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

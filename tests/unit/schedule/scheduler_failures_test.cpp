@@ -283,13 +283,13 @@ TEST(SchedulerFailures, WhatATaskInWorkMadeBeforeIsNotRemoved) {
   farm.finish(farm.ask_one("a"));
   const Digest film = outputs_of(farm.spec(), farm.job, first.lease.task).front().digest;
   EXPECT_FALSE(farm.scheduler.is_referenced(film));
-  EXPECT_FALSE(farm.scheduler.is_made_again(film)) << "nobody works on it";
+  EXPECT_FALSE(is_made_again(farm.scheduler, film)) << "nobody works on it";
   farm.step(TasksReopened{farm.job, {assemble(0), render(0, 0)}, "somebody wants it"});
   const GrantLease again = farm.ask_one("a");
   ASSERT_EQ(again.lease.task, first.lease.task);
-  EXPECT_TRUE(farm.scheduler.is_made_again(film));
+  EXPECT_TRUE(is_made_again(farm.scheduler, film));
   farm.fail(again);
-  EXPECT_FALSE(farm.scheduler.is_made_again(film));
+  EXPECT_FALSE(is_made_again(farm.scheduler, film));
 }
 
 TEST(SchedulerFailures, AWorkerThatStartsAnewMayTryOnceMore) {

@@ -35,7 +35,7 @@ def export(folder, strict=False, frames=None):
     bpy.context.window.view_layer = view_layer
     fps = scene.render.fps / scene.render.fps_base
     checks.check_scene(scene, view_layer, report)
-    image, output = image_of(scene), output_of(scene, fps)
+    image, output, light = image_of(scene), output_of(scene, fps), light_of(scene)
 
     # Evaluate each frame once.
     shapes, camera, world = geometry.Geometry(report), Camera(scene, report), World(scene, report)
@@ -62,8 +62,8 @@ def export(folder, strict=False, frames=None):
     job["environment"] = world.job(folder, numbers)
     if "keys" in job["camera"]:
         job["motion"] = {"curve": "linear"}
-    if scene.render.engine == "CYCLES":
-        job["light"] = light_of(scene.cycles)
+    if light:
+        job["light"] = light
     job["output"] = output
     if not (strict and report.entries):
         try:
@@ -119,8 +119,11 @@ def image_of(scene):
     return image
 
 
-def light_of(cycles):
-    """As many surfaces as the kind of light that meets most of them; check_cycles reports what has fewer."""
+def light_of(scene):
+    """Of a file for Cycles as many surfaces as the kind of light that meets most; check_cycles reports what has fewer."""
+    if scene.render.engine != "CYCLES":
+        return None
+    cycles = scene.cycles
     most = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces), MOST_BOUNCES)
     return {"bounces": most, "filterGlossy": cycles.blur_glossy > 0}
 
