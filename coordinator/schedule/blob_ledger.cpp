@@ -262,8 +262,11 @@ void BlobLedger::share_inputs(const JobView& job, TaskIndex task, const std::str
   for (const TaskIndex input : job.graph.inputs(key)) {
     if (record(input).is_shared || job.made.maker(input) == worker) continue;
     record(input).is_shared = true;
+    // Films stay or go whoever has read the state.
     for (const BlobRef& output : job.made.outputs(input)) {
-      if (!checkpoints_.keeps(job.graph.key(input)) && stays(job, input, output)) blobs.add(output);
+      if (output.kind == BlobKind::state && !checkpoints_.keeps(job.graph.key(input)) &&
+          stays(job, input, output))
+        blobs.add(output);
     }
   }
 }

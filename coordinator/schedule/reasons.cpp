@@ -390,8 +390,9 @@ std::optional<Cause> Reasons::lack_of_room(const Digest& digest, const Scheduler
   }
   for (const Digest& other : scheduler_.jobs()) {
     const Scheduler::Job& holder = *scheduler_.find_job(other);
-    if (other != digest && holder.begun_runs > Run(0) && is_open(holder.status))
-      cause.jobs.push_back(other);
+    if (other == digest || holder.begun_runs == Run(0) || !is_open(holder.status)) continue;
+    cause.jobs.push_back(other);
+    if (holder.status == JobStatus::running) cause.aside_bytes += begun_bytes(holder.in_store());
   }
   return cause;
 }

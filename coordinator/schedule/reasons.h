@@ -30,7 +30,8 @@ struct Cause {
   /// others that were begun; where there is room, the one that comes first. Of paused: another than
   /// the one that waits.
   std::vector<Digest> jobs = {};
-  std::uint64_t need_bytes = 0, free_bytes = 0, ended_bytes = 0;
+  /// Of store; aside: of what is free, what others need for what they have begun.
+  std::uint64_t need_bytes = 0, free_bytes = 0, ended_bytes = 0, aside_bytes = 0;
   Room room = Room::enough;
 };
 

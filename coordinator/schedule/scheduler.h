@@ -60,6 +60,7 @@ class Scheduler {
     std::array<TimePoint, 3> rests_until = {};
     std::string waits = {};     ///< for what, as far as an event said so
     bool is_hopeless = false;   ///< the store was too small for it
+    bool yields = false;        ///< see JobInStore
     std::string renderer = {};  ///< of what is done; empty: not known
     bool is_mixed = false;      ///< others have made some of it, too
     /// Since then nobody renders so, and others would take over.
@@ -69,7 +70,7 @@ class Scheduler {
 
     Rank rank() const { return {-spec.priority, sequence}; }
     JobInStore in_store(bool may_go_on = true) const {
-      return {spec, tasks.graph(), tasks.book(), sizes, begun_runs, may_go_on};
+      return {spec, tasks.graph(), tasks.book(), sizes, begun_runs, may_go_on, yields};
     }
     /// Those that render as what is done of it.
     Crew crew(const LeaseBook& leases, TimePoint now) const {

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/size_text.h"
 #include "coordinator/schedule/scheduler.h"
@@ -8,8 +9,8 @@
 namespace baton {
 namespace {
 
-/// Whether one of the job's ready tasks could be granted in a store that holds nothing else.
-bool could_go_on_alone(const Scheduler::Job& job, std::uint64_t store_limit) {
+/// What the job has in the store.
+std::uint64_t own_bytes(const Scheduler::Job& job) {
   const JobTasks& tasks = job.tasks;
   std::uint64_t own = 0;
   for (TaskIndex task = 0; task < tasks.graph().num_tasks(); ++task) {
@@ -19,20 +20,23 @@ bool could_go_on_alone(const Scheduler::Job& job, std::uint64_t store_limit) {
         own += blob.kind == BlobKind::image || blob.is_held() ? 0 : blob.size_bytes;
     }
   }
-  const StoreRoom alone{.limit = store_limit, .used = own};
-  return std::ranges::any_of(tasks.book().ready(), [&](TaskIndex task) {
-    return room_for(alone, job.in_store(), {}, task, Room::enough) == Room::enough;
+  return own;
+}
+
+/// Whether one of the job's ready tasks could be granted in such a store.
+bool could_go_on(const Scheduler::Job& job, const StoreRoom& room) {
+  return std::ranges::any_of(job.tasks.book().ready(), [&](TaskIndex task) {
+    return room_for(room, job.in_store(), {}, task, Room::enough) == Room::enough;
   });
 }
 
 std::string hopeless_text(const Scheduler::Job& job, std::uint64_t store_limit) {
-  const JobInStore in_store = job.in_store();
-  const std::uint64_t needed =
-      std::max(bytes_alone(in_store), needed_bytes(in_store, *job.tasks.book().ready().begin()));
+  const TaskIndex next = *job.tasks.book().ready().begin();
   return fmt::format(
-      "the store is too small for it: it needs about {} at once, and --store-limit allows {}: "
-      "raise the limit, and submit it again",
-      bytes_text(needed), bytes_text(store_limit));
+      "the store is too small for it: its next frames need {} beside the {} that it has made, and "
+      "--store-limit allows {}: raise the limit, and submit it again",
+      bytes_text(needed_bytes(job.in_store(), next)), bytes_text(own_bytes(job)),
+      bytes_text(store_limit));
 }
 
 }  // namespace
@@ -71,8 +75,8 @@ Room Scheduler::room_for(const Job& job, TaskIndex task, Room before) const {
 }
 
 /// Where nobody finds work, room is made, until somebody does: what stays for workers that may be
-/// lost goes; jobs fail that could not go on if they were alone, or else the last one that could
-/// not end; and where all could, the last one begins again after the others.
+/// lost goes; jobs fail that could not go on if they were alone; and where all could, the last one
+/// begins again after the others. Where only jobs that have ended are in the way, it waits.
 void Scheduler::make_room(Actions& actions) {
   if (rules_.store_limit == 0 || !leases_.empty() || leases_.connected().empty()) return;
   std::vector<Digest> stuck;
@@ -88,34 +92,38 @@ void Scheduler::make_room(Actions& actions) {
   }
   if (store_bytes() < held) return;
 
-  const auto fail = [&](const Digest& digest) {
+  const auto could_alone = [&](const Digest& digest) {
+    const Job& job = jobs_.at(digest);
+    return could_go_on(job, {.limit = rules_.store_limit, .used = own_bytes(job)});
+  };
+  const auto end = std::ranges::stable_partition(stuck, could_alone).begin();
+  for (const Digest& digest : std::ranges::subrange(end, stuck.end())) {
     Job& job = jobs_.at(digest);
     job.is_hopeless = true;
     end_job(digest, job, JobStatus::failed, hopeless_text(job, rules_.store_limit), actions);
-  };
-  const auto goes_on = [&](const Digest& digest) {
-    return could_go_on_alone(jobs_.at(digest), rules_.store_limit);
-  };
-  const auto end = std::ranges::stable_partition(stuck, goes_on).begin();
-  std::for_each(end, stuck.end(), fail);
-  if (end != stuck.end()) return;
-  std::erase_if(stuck, [&](const Digest& job) { return jobs_.at(job).begun_runs == Run(0); });
-  if (stuck.size() < 2) return;
-  const auto hopeless = std::ranges::find_if(stuck.rbegin(), stuck.rend(), [&](const Digest& job) {
-    return bytes_alone(jobs_.at(job).in_store()) > rules_.store_limit;
-  });
-  if (hopeless != stuck.rend()) return fail(*hopeless);
-
-  // All that the last one has in the store is made once more.
-  Job& last = jobs_.at(stuck.back());
-  RecordReopened all{stuck.back(), {}, "other jobs need its room in the store"};
-  const JobGraph& graph = last.tasks.graph();
-  for (TaskIndex task = graph.num_frames(); task < graph.num_tasks(); ++task) {
-    if (!last.tasks.ledger().live_blobs(last.tasks.view(), task).empty())
-      all.tasks.push_back(graph.key(task));
   }
-  reopen(std::move(all), last, actions);
+  if (end != stuck.end()) return;
+  const std::uint64_t kept = std::exchange(kept_bytes_, 0);
+  const bool ended_are_in_the_way = std::ranges::any_of(stuck, [&](const Digest& job) {
+    return RoomOfTasks(*this, jobs_.at(job), Room::enough).most() == Room::enough;
+  });
+  kept_bytes_ = kept;
+  std::erase_if(stuck, [&](const Digest& job) { return jobs_.at(job).begun_runs == Run(0); });
+  if (ended_are_in_the_way || stuck.size() < 2) return;
+
+  // All that the last one has in the store is made once more, and what that needs.
+  Job& last = jobs_.at(stuck.back());
+  const JobGraph& graph = last.tasks.graph();
+  RecordReopened all{stuck.back(), {}, "other jobs need its room in the store"};
+  do {
+    reopen(std::exchange(all, RecordReopened{all.job, {}, all.why}), last, actions);
+    for (TaskIndex task = graph.num_frames(); task < graph.num_tasks(); ++task) {
+      if (!last.tasks.ledger().live_blobs(last.tasks.view(), task).empty())
+        all.tasks.push_back(graph.key(task));
+    }
+  } while (!all.tasks.empty());
   last.begun_runs = Run(0);
+  last.yields = true;
 }
 
 Room RoomOfTasks::operator()(TaskIndex task) {

@@ -87,8 +87,9 @@ bool can_all_end(const StoreRoom& room, const JobInStore& job, std::span<const J
   std::uint64_t taken = room.kept + claims[0].stays;
   for (const JobInStore& other : others) {
     if (other.begun_runs == Run(0)) continue;
+    if (job.yields) return false;
     const Claim claim = claim_of(other);
-    if (claim.whole() > room.limit) {
+    if (claim.whole() > room.limit + room.limit / kSlackShare) {
       taken += std::min(claim.stays, held);
       continue;
     }
@@ -110,8 +111,6 @@ bool can_all_end(const StoreRoom& room, const JobInStore& job, std::span<const J
 
 }  // namespace
 
-std::uint64_t bytes_alone(const JobInStore& job) { return claim_of(job).whole(); }
-
 std::uint64_t unmade_bytes(const JobInStore& job, Run end) {
   const JobGraph& graph = job.graph;
   std::uint64_t bytes = 0;
@@ -125,6 +124,8 @@ std::uint64_t unmade_bytes(const JobInStore& job, Run end) {
         times(num_open_second_passes(job, step), job.sizes.mean(graph, second_pass_task(step, 0)));
   return bytes;
 }
+
+std::uint64_t begun_bytes(const JobInStore& job) { return unmade_bytes(job, end_in_work(job)); }
 
 std::uint64_t needed_bytes(const JobInStore& job, TaskIndex task) {
   const TaskKey key = job.graph.key(task);
@@ -154,7 +155,7 @@ Room room_for(const StoreRoom& room, const JobInStore& job, std::span<const JobI
   std::uint64_t bytes = room.used + needed_bytes(job, task);
   if (is_begun && room.is_idle && bytes <= more) return Room::enough;
   for (const JobInStore& other : others) {
-    const std::uint64_t unmade = unmade_bytes(other, end_in_work(other));
+    const std::uint64_t unmade = begun_bytes(other);
     const bool is_stuck = room.is_idle && room.used + unmade > more;  // it can wait
     if (other.may_go_on && !is_stuck) bytes += unmade;
   }

@@ -40,6 +40,8 @@ struct JobInStore {
   Run begun_runs;
   /// It is not paused, and somebody renders as it was begun.
   bool may_go_on = true;
+  /// It has begun again for others, and waits until nobody is begun.
+  bool yields = false;
 };
 
 /// What the open tasks of the runs before `end` will add to the store, their second passes
@@ -48,8 +50,8 @@ std::uint64_t unmade_bytes(const JobInStore& job, Run end);
 /// What the store must take so that the frames of a task can be written, or the task.
 std::uint64_t needed_bytes(const JobInStore& job, TaskIndex task);
 
-/// What the store must take at once so that the job can end where there is no other, about.
-std::uint64_t bytes_alone(const JobInStore& job);
+/// What the open tasks of the runs that are in work will add.
+std::uint64_t begun_bytes(const JobInStore& job);
 
 /// Whether a task may be granted; if not, what it waits for, least first.
 enum class Room : std::uint8_t {

@@ -375,13 +375,7 @@ std::string Answers::store_text(const Cause& cause, const std::string& place) co
   if (cause.room == Room::enough)
     return fmt::format("room in the store is left for {}, which comes before {}",
                        names_text(holders, "job"), place);
-  // While something is in work, runs end and make room.
   const StoreRoom room = farm_.scheduler.room();
-  if (room.is_idle && cause.need_bytes > room.limit)
-    return fmt::format(
-        "the store, of {}, is too small for all tiles of {}, which need {}: raise "
-        "--store-limit",
-        bytes_text(room.limit), place, bytes_text(cause.need_bytes));
   if (cause.room == Room::beside)
     return fmt::format(
         "{} waits for the end of {}: a store of {} could not end both{}", place,
@@ -391,6 +385,9 @@ std::string Answers::store_text(const Cause& cause, const std::string& place) co
             : "");
   std::string text = fmt::format("the store has no room for all tiles of {}: they need {}, free {}",
                                  place, bytes_text(cause.need_bytes), bytes_text(cause.free_bytes));
+  if (cause.aside_bytes > 0)
+    text += fmt::format(", of which others need {} for what they have begun",
+                        bytes_text(std::min(cause.aside_bytes, cause.free_bytes)));
   if (cause.ended_bytes > 0)
     text += fmt::format("; jobs that have ended hold {}", bytes_text(cause.ended_bytes));
   if (holders.empty())

@@ -97,7 +97,7 @@ class SharedStore {
   }
   /// Nothing happens any more but work. Returns whether all jobs have ended, and are deleted.
   bool work_off() {
-    for (int idle = 0; idle < 2; ++idle) {
+    for (int idle = 0; idle < 8; ++idle) {
       do {
         for (const std::string& worker : workers_) step(WorkRequested{worker, 1 + roll(2)});
         if (!held_.empty()) idle = 0;
@@ -143,6 +143,7 @@ class SharedStore {
   std::size_t num_requeued() const { return num_requeued_; }
   std::size_t num_beside() const { return num_beside_; }
   std::size_t num_failed() const { return num_failed_; }
+  std::uint64_t store_bytes() const { return scheduler_.store_bytes(); }
   std::size_t num_jobs() const { return specs_.size(); }
 
  private:
@@ -251,6 +252,7 @@ TEST(SharedStore, JobsOfWhichEachFitsAloneAllEnd) {
     farm.resume_all();
     ASSERT_TRUE(farm.work_off()) << "the farm stands still: " << farm.why();
     EXPECT_EQ(farm.num_failed(), 0u);
+    EXPECT_EQ(farm.store_bytes(), 0u);
     EXPECT_LE(farm.most_bytes(), farm.limit() + farm.limit() / (seed % 2 == 0 ? 4 : 8));
     num_felt += farm.most_bytes() * 4 > farm.limit() * 3 ? 1 : 0;
     num_requeued += farm.num_requeued();
@@ -270,6 +272,7 @@ TEST(SharedStore, WhatDoesNotFitAloneFailsAndAllOthersEnd) {
     for (int steps = 0; steps < 1500; ++steps) farm.advance();
     farm.resume_all();
     ASSERT_TRUE(farm.work_off()) << "the farm stands still: " << farm.why();
+    EXPECT_EQ(farm.store_bytes(), 0u);
     num_failed += farm.num_failed() > 0 ? 1 : 0;
     num_mixed += farm.num_failed() > 0 && farm.num_failed() < farm.num_jobs() ? 1 : 0;
   }
