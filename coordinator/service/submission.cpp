@@ -309,7 +309,13 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
       farm_.history.jobs().priority(farm_.history.jobs().of(digest).id, document.job.priority);
   BATON_ASSIGN(const std::optional<std::string> known, farm_.journal.document(digest));
   BATON_TRY(take_over(heritage, known ? "" : message.json, event));
-  if (carries_state(event.spec) && !event.plan.leading_runs.empty())
+  const auto had_others = [&](const Digest& former) {
+    const Result<SharedDocument> before = journalled_document(farm_.journal, former);
+    return before && (*before)->parsed &&
+           (*before)->parsed->job.state.checkpoint_every != event.spec.state.checkpoint_every;
+  };
+  if (carries_state(event.spec) && !event.plan.leading_runs.empty() &&
+      std::ranges::any_of(heritage.formers, had_others))
     reasons.push_back(
         fmt::format("runs that were begun stay as they are; state.checkpointEvery, {}, holds for "
                     "those after them",
