@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "common/base/file_stamp.h"
 #include "common/job/plan/sequence.h"
 #include "coordinator/service/locked_frames.h"
 
@@ -74,9 +75,11 @@ Result<PictureSource> find_picture(const JobSpec& spec, const JobTasks& tasks,
   const auto is_written = [&](FrameIndex frame) {
     return tasks.book().status(*tasks.graph().find(assemble_task(frame))) == TaskStatus::done;
   };
-  // Its file is there until the new one takes its place.
+  // Its file stays until the new one takes its place, unless it was made again for want of that.
   const auto was_written = [&](FrameIndex frame) {
-    return !tasks.made().former_outputs(*tasks.graph().find(assemble_task(frame))).empty();
+    const TaskIndex task = *tasks.graph().find(assemble_task(frame));
+    const auto stamp = stamp_of(frame_path(spec, frame));
+    return !tasks.made().former_outputs(task).empty() && stamp && *stamp;
   };
   const FrameIndex end(tasks.graph().num_frames());
   FrameIndex frame{0};

@@ -15,7 +15,8 @@ constexpr int kReferenceSamples = 512;
 /// Far from the seeds that people give.
 constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
-/// The job with at most kPilotPixels an image, for some of its frames.
+}  // namespace
+
 JobSpec small_job(const JobSpec& job, std::vector<FrameNumber> frames) {
   JobSpec small = job;
   small.frames = std::move(frames);
@@ -27,8 +28,6 @@ JobSpec small_job(const JobSpec& job, std::vector<FrameNumber> frames) {
   small.state.preroll = 0;  // by the frames that are measured pixels know enough
   return small;
 }
-
-}  // namespace
 
 std::vector<JobSpec> pilot_windows(const JobSpec& job) {
   const auto length = static_cast<std::ptrdiff_t>(std::min(job.frames.size(), kWindowFrames));

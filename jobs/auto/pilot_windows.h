@@ -7,8 +7,12 @@
 
 namespace baton {
 
-/// The parts of a job that a pilot renders: small (about 2300 pixels), at most twelve frames at its
-/// start and at its end.
+/// The job with about 2,300 pixels an image at most, for some of its frames, to be measured:
+/// without what is rendered before them.
+JobSpec small_job(const JobSpec& job, std::vector<FrameNumber> frames);
+
+/// The parts of a job that a pilot renders: small_job, at most twelve frames at its start and at
+/// its end.
 std::vector<JobSpec> pilot_windows(const JobSpec& job);
 
 /// A window as the scene of a study, with its references. Its last two frames are measured: with

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
+#include "jobs/cli/choice_option.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -134,14 +134,10 @@ void add_radiance_options(CLI::App& command, DisplayOptions& options) {
       .add_option("--exposure", options.stops,
                   "stops by which a picture is brighter, as in a viewer; default: 0")
       ->check(CLI::Range(-100.0, 100.0));
-  const std::map<std::string, DisplayCurve> curves{{"none", DisplayCurve::none},
-                                                   {"filmic", DisplayCurve::filmic}};
-  command
-      .add_option("--curve", options.curve,
-                  "none: what is brighter than 1 is white; filmic: bright light fades to white; "
-                  "default: none")
-      ->transform(CLI::CheckedTransformer(curves).description("{none,filmic}"))
-      ->default_str("");
+  add_choice_option<DisplayCurve>(
+      command, "--curve", options.curve,
+      {{"none", DisplayCurve::none}, {"filmic", DisplayCurve::filmic}},
+      "none: what is brighter than 1 is white; filmic: bright light fades to white; default: none");
 }
 
 void add_aov_options(CLI::App& command, std::string& aov, DisplayOptions& options) {

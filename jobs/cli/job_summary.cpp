@@ -32,8 +32,6 @@ void add_sampling(const SamplingStats& s, ordered_json& object) {
   object["essHistogram"] = s.ess_histogram;
 }
 
-std::string percent(float share) { return fmt::format("{:.2g} %", 100 * share); }
-
 /// As numbers a reader of JSON may compare with: null where nothing tells the noise.
 void add_quality(const FrameQuality& q, ordered_json& row) {
   if (q.pixels == 0) return;
@@ -154,8 +152,8 @@ std::string job_statistics(const JobSummary& job) {
                         percent_text(did.pixels_resampled, lit));
   }
   if (s.light.direct > 0)
-    text += fmt::format("bounces    light between surfaces adds {:.2g} %\n",
-                        100 * s.light.indirect / s.light.direct);
+    text += fmt::format("bounces    light between surfaces adds {}\n",
+                        share_text(s.light.indirect / s.light.direct));
   if (job.state_pixels > 0) {
     text +=
         fmt::format("state      {:.1f} bytes a pixel, {} in all; {:.1f} % of the CPU time\n",
@@ -178,12 +176,12 @@ std::string judgement_text(const JobDetail& detail) {
   if (j.frames == 0) return "";
   std::string text;
   if (j.noise_source != NoiseSource::none) {
-    text += fmt::format("noise      {} of the radiance", percent(j.noise));
+    text += fmt::format("noise      {} of the radiance", share_text(j.noise));
     if (j.frames_told > 1) {
-      text += fmt::format(", by frame {} to {} (frame {})", percent(j.noise_least),
-                          percent(j.noise_most), j.noisiest);
+      text += fmt::format(", by frame {} to {} (frame {})", share_text(j.noise_least),
+                          share_text(j.noise_most), j.noisiest);
     }
-    text += fmt::format("; as shown {}; told from {}\n", percent(j.noise_shown),
+    text += fmt::format("; as shown {}; told from {}\n", share_text(j.noise_shown),
                         j.noise_source == NoiseSource::scatter
                             ? "the scatter of rounds"
                             : "pixels that were sampled twice, without that of edges");

@@ -61,6 +61,11 @@ std::string exposure_text(float stops) {
   return fmt::format("exposure {:+.3g} stops", rounded + 0.0f);  // no -0
 }
 
+std::string share_text(double share) {
+  const double percent = 100 * share;
+  return percent < 99.5 ? fmt::format("{:.2g} %", percent) : fmt::format("{:.0f} %", percent);
+}
+
 std::string percent_text(std::uint64_t part, std::uint64_t whole) {
   return fmt::format(
       "{:.1f}%", whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole));

@@ -24,6 +24,9 @@ Result<std::int64_t> parse_since(const std::string& text, std::int64_t now);
 /// "exposure +1.5 stops".
 std::string exposure_text(float stops);
 
+/// Two digits of it: "0.92 %", "11 %"; all before the point: "140 %".
+std::string share_text(double share);
+
 /// "25.0%"; whole 0 gives "0.0%".
 std::string percent_text(std::uint64_t part, std::uint64_t whole);
 

@@ -38,6 +38,11 @@ def scale_from_zero(stage):
     keyed(stage.ball, "scale", {1: (0, 0, 0), 3: (1, 1, 1)})
 
 
+@case("2 bounces of one kind of light: 4 of all are taken")
+def bounces_that_differ(stage):
+    stage.scene.cycles.diffuse_bounces = 2
+
+
 @case()
 def third_uv_map(stage):
     for name in ("second", "third"):

@@ -100,6 +100,8 @@ def wrong_command_lines(programs, folder):
             (["farm", "slurm", "job.json", "--node", "2"], USAGE, 'slurm: no option --node; did you mean "--nodes"?'),
             (["check"], USAGE, "JOB is required"),
             (["job", "wait", "abc", "--timeout", "-1"], USAGE, "--timeout"),
+            (["view", "a.exr", "--curve", "foo"], USAGE, "--curve: foo not in {none,filmic}"),
+            (["key", "add", "keys", "anna", "--role", "boss"], USAGE, "--role: boss not in {worker,viewer,user,admin}"),
             (["job", "list", "--coordinator", "nonsense"], USAGE, "nonsense"),
             (["job", "list", "--coordinator", "tcp://127.0.0.1:1"], UNAVAILABLE,
              "tcp://127.0.0.1:1: no coordinator listens there"),

@@ -13,9 +13,10 @@ namespace baton {
 /// What catches shadows (ObjectSpec::catcher, GroundSpec::catcher) is in no image. Where a ray
 /// meets no object it sees the nearest catcher, which reflects with the albedo pi / E per channel
 /// (CatcherAlbedo): what methods estimate of it is the share of the light that arrives, S / U, with
-/// all their machinery and without bias. A pixel that sees an object, too, or has seen one in an
-/// earlier round, belongs to that: its sites on catchers are sampled beside it, afresh in each
-/// round, so that objects have the same bytes with and without catchers.
+/// all their machinery and without bias; what objects throw onto it is part of S. A pixel that sees
+/// an object, too, or has seen one in an earlier round, belongs to that: its sites on catchers are
+/// sampled beside it, afresh in each round, so that objects have the same bytes with and without
+/// catchers.
 
 /// Lets rays that meet no object see catchers. num_sites: of each pixel; those of a pixel follow
 /// each other. In pixels that see an object `hit` stays false.

@@ -264,7 +264,7 @@ void TileFrameRenderer::shade(RoundWork& work, SampleState& state, PixelBatch& b
     pixel.mask = all_free && !known.blocked ? 1.0f : 0.0f;
     pixel.blocked = known.unshadowed ? *known.unshadowed - pixel.radiance : found.blocked;
     pixel.indirect = batch.indirect[i];
-    if (bounces_ && !surfaces.sees_catcher(slot)) {
+    if (bounces_ && work.at.round >= Round(0) && !surfaces.sees_catcher(slot)) {
       stats_.light.direct += double{luminance(pixel.radiance)};
       stats_.light.indirect += double{luminance(pixel.indirect)};
     }

@@ -122,8 +122,8 @@ Status expect_all_assets(const ParsedJobDocument& document) {
 }  // namespace
 
 Result<JobSpec> parse_job(std::string_view text, const std::string& name,
-                          const std::filesystem::path& base_directory, JobSpec preset) {
-  return read(text, name, base_directory, std::move(preset));
+                          const std::filesystem::path& base_directory) {
+  return read(text, name, base_directory, {});
 }
 
 JobSpec preset_job() {

@@ -15,13 +15,12 @@ namespace baton {
 /// everything but what came after them, and that is as it was then.)
 JobSpec preset_job();
 
-/// The job of a JSON text, which is `preset` where it says nothing. name goes first in every error
+/// The job of a JSON text, which is JobSpec where it says nothing. name goes first in every error
 /// line (usually the file); relative paths are taken relative to base_directory. One Error lists
-/// every fault, one per line: `job.json:
-/// $.image.width: expected an integer in [1, 32768], got "wide"`; an unknown key names the likely
-/// one. Schema: jobs/schema/job.schema.json.
+/// every fault, one per line: `job.json: $.image.width: expected an integer in [1, 32768], got
+/// "wide"`; an unknown key names the likely one. Schema: jobs/schema/job.schema.json.
 Result<JobSpec> parse_job(std::string_view json, const std::string& name,
-                          const std::filesystem::path& base_directory, JobSpec preset = {});
+                          const std::filesystem::path& base_directory);
 
 /// A value that is said in place of the job file's.
 struct JobOverride {

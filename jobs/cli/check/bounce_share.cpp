@@ -11,15 +11,15 @@
 #include "common/image/image_io.h"
 #include "common/job/aov.h"
 #include "common/job/plan/sequence.h"
+#include "jobs/auto/pilot_windows.h"
 #include "jobs/cli/farm_job_runner.h"
-#include "jobs/study/study.h"
+#include "jobs/cli/text.h"
 
 namespace baton {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPixels = 64 * 36;
 /// Materials that are seen in a smaller share of the lit pixels tell little.
 constexpr double kLeastSeen = 0.01;
 
@@ -28,24 +28,18 @@ struct Sums {
   std::size_t pixels = 0;
 };
 
-JobSpec small_job(const JobSpec& job, const fs::path& folder) {
-  JobSpec small = job;
-  small.frames = {job.frames[job.frames.size() / 2]};
-  const auto pixels = static_cast<double>(job.image.rendered().area());
-  small.image = scaled(job.image, std::min(1.0, std::sqrt(kPixels / pixels)));
-  small.image.sites = small.image.max_sites = 1;
-  small.metadata.clear();
-  prepare_measured(small);
-  small.sampling = {};
-  small.sampling.method = Method::bidirectional;
-  small.visibility = {};
-  small.quality = {};
-  small.quality.rounds = 4;
-  small.state = {};
-  small.state.carry = false;
-  small.output.aovs = {Aov::material, Aov::direct, Aov::indirect};
-  small.output.directory = (folder / "frames").string();
-  return small;
+JobSpec job_to_look_at(const JobSpec& job, const fs::path& folder) {
+  JobSpec look = small_job(job, {job.frames[job.frames.size() / 2]});
+  look.image.sites = look.image.max_sites = 1;
+  look.sampling = {};
+  look.sampling.method = Method::bidirectional;
+  look.visibility = {};
+  look.quality = {};
+  look.quality.rounds = 4;
+  look.state.carry = false;
+  look.output.aovs = {Aov::material, Aov::direct, Aov::indirect};
+  look.output.directory = (folder / "frames").string();
+  return look;
 }
 
 double luminance_at(const FilmTile& film, Aov aov, std::size_t pixel) {
@@ -94,15 +88,15 @@ Result<BounceShare> bounce_share(const JobSpec& job) {
     return Error{ErrorKind::io, fmt::format("{}: cannot make a folder", made)};
   const fs::path folder = made;
   const auto render = [&]() -> Result<BounceShare> {
-    const JobSpec small = small_job(job, folder);
+    const JobSpec look = job_to_look_at(job, folder);
     FarmJobRunner runner(FarmOptions{
         .workers = 1,
         .threads_per_worker = std::max(1, static_cast<int>(std::thread::hardware_concurrency())),
         .work_directory = folder / "work"});
     runner.be_quiet();
-    BATON_TRY(runner.run({small}, [](std::size_t, const JobSummary&) { return Status(); }));
-    BATON_ASSIGN(const FilmTile film, read_exr(frame_path(small, FrameIndex())));
-    return share_in(film, material_names(small));
+    BATON_TRY(runner.run({look}, [](std::size_t, const JobSummary&) { return Status(); }));
+    BATON_ASSIGN(const FilmTile film, read_exr(frame_path(look, FrameIndex())));
+    return share_in(film, material_names(look));
   };
   Result<BounceShare> share = render();
   std::error_code left;
@@ -111,9 +105,9 @@ Result<BounceShare> bounce_share(const JobSpec& job) {
 }
 
 std::string text_of(const BounceShare& share) {
-  std::string text = fmt::format("{:.2g} %", 100 * share.whole);
+  std::string text = share_text(share.whole);
   if (!share.material.empty())
-    text += fmt::format(", most on `{}` ({:.2g} %)", share.material, 100 * share.of_material);
+    text += fmt::format(", most on `{}` ({})", share.material, share_text(share.of_material));
   return text;
 }
 

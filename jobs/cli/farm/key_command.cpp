@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
-#include <map>
 #include <memory>
 
 #include "common/protocol/keys.h"
+#include "jobs/cli/choice_option.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/say.h"
 
@@ -49,12 +49,12 @@ void add_key_command(CLI::App& app, ExitCode& code) {
   for (CLI::App* command : {made, added})
     command->add_option("FOLDER", options->folder, "where the keys are kept")->required();
   added->add_option("NAME", options->speaker.name, "whose key it is")->required();
-  added->add_option("--role", options->speaker.role, "worker, viewer, user or admin")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Role>{{"worker", Role::worker},
-                                                                      {"viewer", Role::viewer},
-                                                                      {"user", Role::user},
-                                                                      {"admin", Role::admin}})
-                      .description("{worker,viewer,user,admin}"))
+  add_choice_option<Role>(*added, "--role", options->speaker.role,
+                          {{"worker", Role::worker},
+                           {"viewer", Role::viewer},
+                           {"user", Role::user},
+                           {"admin", Role::admin}},
+                          "worker, viewer, user or admin")
       ->option_text("ROLE=user");
   made->callback([options, &code] { code = finish(create(*options)); });
   added->callback([options, &code] { code = finish(add(*options)); });
